@@ -1,0 +1,293 @@
+// What kernels and host share. Written by build.rs from src/shared.rs; do not edit.
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_GOOGLE_include_directive : require
+layout(local_size_x_id = 0) in;
+#define read_write
+
+// Invocations of a workgroup unless a caller chooses otherwise (local_size_x_id = 0).
+const uint WORKGROUP = 64u;
+// Independently scrambled batches of the low-discrepancy points; sample s belongs to batch s % BATCHES.
+const uint BATCHES = 8u;
+// Consecutive samples of one batch that share a sub-pixel stratum, and so a G-buffer.
+const uint STRATUM = 4u;
+// Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
+const uint MAX_HITS = 8u;
+// Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
+const uint MAX_RAYS = 32u;
+// Value of `Surface::triangle` for a ray that hits nothing.
+const uint MISS = 4294967295u;
+// Projection: all techniques combined by the balance heuristic.
+const uint PROJECTION_MIS = 0u;
+// Projection: the camera ray alone, first hit, as the method was given.
+const uint PROJECTION_CAMERA = 1u;
+// Projection: the normal axis alone, all hits.
+const uint PROJECTION_NORMAL = 2u;
+// No environment.
+const uint ENVIRONMENT_NONE = 0u;
+// The same radiance from everywhere.
+const uint ENVIRONMENT_CONSTANT = 1u;
+// A latitude-longitude image.
+const uint ENVIRONMENT_IMAGE = 2u;
+// Material flag: light enters and leaves through this surface (a BSSRDF).
+const uint TRANSLUCENT = 1u;
+// Light kind: position and intensity [W/sr].
+const uint LIGHT_POINT = 0u;
+// Light kind: a point light with a cone.
+const uint LIGHT_SPOT = 1u;
+// Light kind: direction and perpendicular irradiance [W/m^2].
+const uint LIGHT_DIRECTIONAL = 2u;
+// Dimension: radius.
+const uint DIM_RADIUS = 0u;
+// Dimension: angle in the tangent plane.
+const uint DIM_ANGLE = 1u;
+// Dimension: technique (axis).
+const uint DIM_TECHNIQUE = 2u;
+// Dimension: component of the radial density (channel and source).
+const uint DIM_COMPONENT = 3u;
+// Dimension: which hit of the probe is lit.
+const uint DIM_HIT = 4u;
+// Coordinates of the point that the host computes for each sample: the dimensions above.
+const uint DIMENSIONS = 5u;
+// Dimensions 5 and 6: position within the pixel (a point per stratum, not per sample).
+const uint DIM_PIXEL = 5u;
+// Dimensions 7 and 8: environment direction at the exit (a point per direction).
+const uint DIM_LIGHT = 7u;
+// Dimensions 9 and 10: environment direction at the first surface (a point per direction).
+const uint DIM_REFLECT = 9u;
+// Dimension of the hash that keeps hits beyond MAX_HITS.
+const uint DIM_OVERFLOW = 11u;
+
+// One of PROJECTION_*.
+layout(constant_id = 1) const uint PROJECTION = 0;
+// One of ENVIRONMENT_*.
+layout(constant_id = 2) const uint ENVIRONMENT_KIND = 0;
+// 1 where sums are kept by batch, for the variance.
+layout(constant_id = 3) const uint BATCHED = 0;
+// 1 to count traversal steps (tests and benchmarks).
+layout(constant_id = 4) const uint COUNT_STEPS = 0;
+
+// What is constant over a render: camera, pixels, environment, counts.
+struct View {
+    // A point on the camera's axis near the scene's centre; rays pass through the plane there.
+    vec3 pivot;
+    // From the pivot to the right edge of the full image, in that plane.
+    vec3 right;
+    // From the pivot to the upper edge of the full image.
+    vec3 up;
+    // From the eye to the pivot (perspective); a unit vector (orthographic).
+    vec3 forward;
+    // 1 for a perspective camera, 0 for an orthographic one.
+    float perspective;
+    // Orthographic only: distance from the camera's plane to the pivot's.
+    float reach;
+    // Width of the full image [pixels].
+    uint width;
+    // Height of the full image [pixels].
+    uint height;
+    // First column that is rendered.
+    uint crop_x;
+    // Columns that are rendered.
+    uint crop_width;
+    // Key of all random numbers.
+    uint seed;
+    // Incoming environment directions at each position, N.
+    uint directions;
+    // Delta lights in the scene.
+    uint light_count;
+    // 1 to add the environment where a camera ray hits nothing.
+    uint show_environment;
+    // Constant radiance, or the factor on the image's.
+    vec3 environment_scale;
+    // World direction to image direction: rows of a rotation.
+    vec3 environment_row0;
+    vec3 environment_row1;
+    vec3 environment_row2;
+    // Texels of the environment image.
+    uint environment_width;
+    uint environment_height;
+    // Cells of the environment's sampling density.
+    uint density_width;
+    uint density_height;
+};
+
+// What changes from dispatch to dispatch (push constants, at most 128 bytes).
+struct Step {
+    // First pixel row of the band, in the full image.
+    uint first_row;
+    // Pixels in the band.
+    uint pixel_count;
+    // Index of the sample: number sample_index / BATCHES of batch sample_index % BATCHES.
+    uint sample_index;
+    // 1 to trace `primary` through the pixel's centre, for the AOVs.
+    uint pixel_centre;
+    // First shadow ray of this dispatch: delta lights first, then environment directions.
+    uint ray_begin;
+    // Shadow rays of this dispatch; 0 where the scene has no light.
+    uint ray_count;
+    // 1 in the sample's first dispatch of a kernel, which also counts the sample.
+    uint first;
+    // First sample of the whole range that is in the sums, for `resolve`.
+    uint range_begin;
+    // End of that range.
+    uint range_end;
+    // The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
+    uint point[5];
+};
+
+// A triangle in the order of the BVH's leaves, for traversal.
+struct Triangle {
+    vec3 corner;
+    // From the corner to the second vertex.
+    vec3 edge1;
+    // From the corner to the third vertex; edge1 x edge2 points out of the matter.
+    vec3 edge2;
+    // The set of surfaces that exchange light, to which it belongs.
+    uint set;
+};
+
+// What shading needs of a triangle, in the same order.
+struct Shading {
+    // Interpolated (unit, outward) normals at the three vertices.
+    vec3 normal0;
+    vec3 normal1;
+    vec3 normal2;
+    // Index of the material.
+    uint material;
+};
+
+// A material as kernels read it. Standard dipole of Jensen et al. 2001 with two sources per channel.
+struct Material {
+    // Effective transport coefficient of each channel, sigma_tr [1/length].
+    vec3 sigma_tr;
+    // Depth of the real source z_r of each channel.
+    vec3 z_real;
+    // Height of the virtual source z_v of each channel (positive).
+    vec3 z_virtual;
+    // Radiance per unit shape(r) and unit flux that entered: alpha'/2 / (pi (1 - rho_e)); /pi alone for jensen2001.
+    vec3 strength;
+    // Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
+    vec3 density;
+    // Cumulative probability of the six components, in the order R real, R virtual, G real, ... .
+    float component_cdf[6];
+    // Radius of the ball in which probes look for surfaces.
+    float radius_max;
+    // Rate of the camera projection's exponential: the smallest sigma_tr [1/length].
+    float camera_rate;
+    // Index of refraction, inside over outside.
+    float ior;
+    // GGX width alpha = roughness^2; 0 is a smooth mirror.
+    float alpha;
+    // Linear base colour of an opaque material.
+    vec3 base_color;
+    float metallic;
+    // Emitted radiance.
+    vec3 emission;
+    // TRANSLUCENT or nothing.
+    uint flags;
+};
+
+// A delta light.
+struct Light {
+    vec3 position;
+    // Unit vector in which the light shines (spot, directional).
+    vec3 direction;
+    // Point and spot: intensity x (internal units per metre)^2. Directional: perpendicular irradiance.
+    vec3 intensity;
+    // LIGHT_POINT, LIGHT_SPOT or LIGHT_DIRECTIONAL.
+    uint kind;
+    // Spot: the angular factor is saturate(cosine * scale + offset)^2.
+    float spot_scale;
+    float spot_offset;
+    // KHR_lights_punctual range: factor max(1 - (d * inverse_range)^4, 0); 0 is infinite range.
+    float inverse_range;
+};
+
+// The surface a camera ray meets first (the G-buffer), written by `primary`.
+struct Surface {
+    vec3 position;
+    // Triangle, or MISS.
+    uint triangle;
+    // Weights of the second and third vertex.
+    vec2 barycentric;
+};
+
+// A probe ray, written by `sample`: all points `xo + offset + t * direction` with t in [t_min, t_max].
+struct Probe {
+    // From xo to the ray's origin.
+    vec3 offset;
+    // Unit vector.
+    vec3 direction;
+    float t_min;
+    // Below t_min for a pixel without a probe.
+    float t_max;
+    // Camera projection only: radius in the tangent plane.
+    float radius;
+};
+
+// Where a probe meets surfaces of its set, written by `reproject`.
+struct Hits {
+    // Hits found; the first min(count, MAX_HITS) entries are set.
+    uint count;
+    float t[8];
+    uint triangle[8];
+};
+
+// Running sums of a pixel, compensated: the true sum is `x + x_carry` (Neumaier / TwoSum).
+struct Sums {
+    // Light that passed through translucent matter.
+    vec3 subsurface;
+    vec3 subsurface_carry;
+    // Light reflected or emitted by the first surface, and the environment where it is shown.
+    vec3 reflection;
+    vec3 reflection_carry;
+    // Samples added.
+    uint samples;
+    // Samples whose camera ray hit the scene.
+    uint covered;
+    // Contributions left out because they were not finite and non-negative.
+    uint invalid;
+};
+
+// A pixel of the finished image.
+struct Pixel {
+    vec3 subsurface;
+    vec3 reflection;
+    // Variance of the mean of `subsurface`, between batches; 0 with fewer than BATCHES samples.
+    vec3 variance;
+    float alpha;
+    uint samples;
+    uint invalid;
+};
+
+// One View.
+#define VIEWS(access) layout(set = 0, binding = 0, scalar) access buffer ViewsBlock { View views[]; }
+// Compressed wide BVH nodes (Ylitie et al. 2017), five words each, as obvhs lays them out.
+#define NODES(access) layout(set = 0, binding = 1, scalar) access buffer NodesBlock { uvec4 nodes[]; }
+// Triangles in leaf order.
+#define TRIANGLES(access) layout(set = 0, binding = 2, scalar) access buffer TrianglesBlock { Triangle triangles[]; }
+// Normals and material of each triangle.
+#define SHADINGS(access) layout(set = 0, binding = 3, scalar) access buffer ShadingsBlock { Shading shadings[]; }
+// Materials.
+#define MATERIALS(access) layout(set = 0, binding = 4, scalar) access buffer MaterialsBlock { Material materials[]; }
+// Delta lights.
+#define LIGHTS(access) layout(set = 0, binding = 5, scalar) access buffer LightsBlock { Light lights[]; }
+// Environment radiance, row by row from the zenith.
+#define ENVIRONMENT(access) layout(set = 0, binding = 6, scalar) access buffer EnvironmentBlock { vec3 environment[]; }
+// Environment sampling: density_height + 1 marginal values, then density_width + 1 for each row, all from 0 to 1.
+#define ENVIRONMENT_CDF(access) layout(set = 0, binding = 7, scalar) access buffer EnvironmentCdfBlock { float environment_cdf[]; }
+// G-buffer of the current stratum, one per pixel of the band.
+#define SURFACES(access) layout(set = 0, binding = 8, scalar) access buffer SurfacesBlock { Surface surfaces[]; }
+// One per pixel of the band.
+#define PROBES(access) layout(set = 0, binding = 9, scalar) access buffer ProbesBlock { Probe probes[]; }
+// One per pixel of the band.
+#define HIT_LISTS(access) layout(set = 0, binding = 10, scalar) access buffer HitListsBlock { Hits hit_lists[]; }
+// One per pixel of the band.
+#define RUNNING_SUMS(access) layout(set = 0, binding = 11, scalar) access buffer RunningSumsBlock { Sums running_sums[]; }
+// Subsurface sum of each batch: batch * pixel_count + pixel.
+#define BATCH_SUMS(access) layout(set = 0, binding = 12, scalar) access buffer BatchSumsBlock { vec3 batch_sums[]; }
+// The finished band.
+#define PIXELS(access) layout(set = 0, binding = 13, scalar) access buffer PixelsBlock { Pixel pixels[]; }
+// Largest number of traversal steps of any invocation, by atomicMax.
+#define COUNTERS(access) layout(set = 0, binding = 14, scalar) access buffer CountersBlock { uint counters[]; }
+
+layout(push_constant, scalar) uniform StepBlock { Step step_; };

@@ -1,0 +1,10 @@
+//! translucent renders translucent matter in glTF scenes with raw Vulkan compute.
+
+pub mod error;
+pub mod reference;
+pub mod scene;
+pub mod settings;
+pub mod shared;
+
+pub use error::{Error, Result};
+pub use settings::{CameraChoice, Normalisation, Projection, Settings};

@@ -1,0 +1,81 @@
+//! What a caller may choose about a render.
+
+use crate::shared;
+
+/// How a sampled point of the tangent plane is carried to the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Projection {
+    /// Normal, camera and two tangent axes, combined by the balance heuristic: unbiased, finite variance.
+    #[default]
+    Mis = shared::PROJECTION_MIS,
+    /// The camera ray alone, first hit, exponential radius: the method as it was given, with its bias.
+    Camera = shared::PROJECTION_CAMERA,
+    /// The normal axis alone, all hits: unbiased, log-infinite variance on curved surfaces.
+    Normal = shared::PROJECTION_NORMAL,
+}
+
+/// Which constant stands before the product of Fresnel factors and profile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Normalisation {
+    /// 1 / (pi (1 - rho_e)): what leaves is what entered times the albedo.
+    #[default]
+    Energy,
+    /// 1 / pi, as in Jensen et al. 2001: darker by exactly 1 - rho_e.
+    Jensen2001,
+}
+
+/// Which camera of the scene looks.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub enum CameraChoice {
+    /// The first of the file, or one that frames the scene.
+    #[default]
+    Default,
+    /// By position in the file's list of camera nodes.
+    Index(usize),
+    /// By name of the node or of the camera.
+    Name(String),
+}
+
+/// Everything about a render that is not the scene. `Settings::default()` is the program's default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Width and height [pixels]; without it 1024x1024, or the camera's aspect ratio at that height.
+    pub resolution: Option<(u32, u32)>,
+    pub camera: CameraChoice,
+    /// Rendered part of the image, `[x0, y0, x1, y1]`, exclusive of x1 and y1 [pixels].
+    pub crop: Option<[u32; 4]>,
+    /// Incoming environment directions at each position, N >= 1.
+    pub directions: u32,
+    pub projection: Projection,
+    pub normalisation: Normalisation,
+    /// Key of all random numbers.
+    pub seed: u32,
+    /// Adds the environment where a camera ray hits nothing.
+    pub show_environment: bool,
+    /// Share of the profile's energy beyond the ball in which probes look for surfaces; 0 has no ball.
+    /// It is the only bias of `mis` and `normal`: at most this share of the light is missed.
+    pub radius_tail: f64,
+    /// Most bytes of device memory that buffers may take; without it half of the device's largest heap.
+    pub memory_budget: Option<u64>,
+    /// Invocations of a workgroup, 1 to 128; the image does not depend on it.
+    pub workgroup: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            resolution: None,
+            camera: CameraChoice::Default,
+            crop: None,
+            directions: 1,
+            projection: Projection::Mis,
+            normalisation: Normalisation::Energy,
+            seed: 0,
+            show_environment: false,
+            radius_tail: 1e-6,
+            memory_budget: None,
+            workgroup: shared::WORKGROUP,
+        }
+    }
+}

@@ -1,0 +1,457 @@
+//! THE definition of all that Rust and GLSL share: structs, buffer slots, scene features, constants.
+//!
+//! `build.rs` includes this file and writes `glsl/shared.glsl` from it ([`glsl`]). The structs are
+//! `repr(C)` and `Pod` here and `scalar` there; neither layout can hold hidden padding, so equal text
+//! means equal bytes, and a test reads the offsets back out of the SPIR-V.
+//!
+//! Lengths are in *internal units* unless a field says otherwise: the scene is moved to its centre and
+//! scaled so that its translucent part has about radius 1 (see `scene::Frame`). Colours are linear
+//! Rec.709.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{UVec4, Vec2, Vec3};
+
+/// A type that has the same bytes in Rust (`repr(C)`) and in GLSL (`scalar` layout).
+pub trait Glsl {
+    /// The GLSL declaration of a variable of this type.
+    fn declare(name: &str) -> String;
+}
+
+macro_rules! glsl_types {
+    ($($rust:ty => $glsl:literal),* $(,)?) => {$(
+        impl Glsl for $rust {
+            fn declare(name: &str) -> String {
+                format!(concat!($glsl, " {}"), name)
+            }
+        }
+    )*};
+}
+glsl_types!(f32 => "float", u32 => "uint", Vec2 => "vec2", Vec3 => "vec3", UVec4 => "uvec4");
+
+impl<T: Glsl, const N: usize> Glsl for [T; N] {
+    fn declare(name: &str) -> String {
+        format!("{}[{N}]", T::declare(name))
+    }
+}
+
+/// Name, byte offset and GLSL text of a struct's members, for the layout test.
+pub struct StructLayout {
+    pub name: &'static str,
+    pub size: usize,
+    pub members: &'static [(&'static str, usize)],
+}
+
+macro_rules! structs {
+    ($($(#[doc = $doc:literal])* struct $name:ident {
+        $($(#[doc = $field_doc:literal])* $field:ident: $type:ty,)*
+    })*) => {
+        $($(#[doc = $doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+        #[repr(C)]
+        pub struct $name { $($(#[doc = $field_doc])* pub $field: $type,)* }
+
+        impl Glsl for $name {
+            fn declare(name: &str) -> String { format!(concat!(stringify!($name), " {}"), name) }
+        })*
+
+        /// Every shared struct, as Rust lays it out.
+        pub const STRUCTS: &[StructLayout] = &[$(StructLayout {
+            name: stringify!($name),
+            size: size_of::<$name>(),
+            members: &[$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+        },)*];
+
+        fn glsl_structs(text: &mut String) {
+            $($(text.push_str(concat!("//", $doc, "\n"));)*
+            text.push_str(concat!("struct ", stringify!($name), " {\n"));
+            $($(text.push_str(concat!("    //", $field_doc, "\n"));)*
+            text.push_str(&format!("    {};\n", <$type>::declare(stringify!($field))));)*
+            text.push_str("};\n\n");)*
+        }
+    };
+}
+
+macro_rules! buffers {
+    ($($(#[doc = $doc:literal])* $slot:ident = $binding:literal: $macro:ident [$element:ty] $array:ident;)*) => {
+        /// The storage buffers, by binding number in the one descriptor set.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u32)]
+        pub enum Slot { $($(#[doc = $doc])* $slot = $binding,)* }
+
+        impl Slot {
+            /// Every slot, in order of binding.
+            pub const ALL: &'static [Slot] = &[$(Slot::$slot,)*];
+
+            /// The buffer's name, as debuggers and errors show it.
+            pub fn name(self) -> &'static str {
+                match self { $(Slot::$slot => stringify!($array),)* }
+            }
+
+            /// Bytes of one element.
+            pub fn stride(self) -> usize {
+                match self { $(Slot::$slot => size_of::<$element>(),)* }
+            }
+        }
+
+        fn glsl_buffers(text: &mut String) {
+            $($(text.push_str(concat!("//", $doc, "\n"));)*
+            text.push_str(&format!(
+                concat!("#define ", stringify!($macro), "(access) layout(set = 0, binding = ",
+                    stringify!($binding), ", scalar) access buffer ", stringify!($slot), "Block {{ {}; }}\n"),
+                <$element>::declare(concat!(stringify!($array), "[]"))));)*
+            text.push('\n');
+        }
+    };
+}
+
+macro_rules! features {
+    ($($(#[doc = $doc:literal])* $field:ident = $id:literal: $constant:ident,)*) => {
+        /// What a scene and its settings require of the kernels: the specialization constants.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub struct Features { $($(#[doc = $doc])* pub $field: u32,)* }
+
+        impl Features {
+            /// (constant id, value) of every specialization constant.
+            pub fn constants(&self) -> Vec<(u32, u32)> {
+                vec![$(($id, self.$field),)*]
+            }
+        }
+
+        fn glsl_features(text: &mut String) {
+            $($(text.push_str(concat!("//", $doc, "\n"));)*
+            text.push_str(concat!("layout(constant_id = ", stringify!($id), ") const uint ",
+                stringify!($constant), " = 0;\n"));)*
+            text.push('\n');
+        }
+    };
+}
+
+macro_rules! constants {
+    ($($(#[doc = $doc:literal])* $name:ident: $type:tt = $value:expr;)*) => {
+        $($(#[doc = $doc])* pub const $name: $type = $value;)*
+
+        fn glsl_constants(text: &mut String) {
+            $($(text.push_str(concat!("//", $doc, "\n"));)*
+            text.push_str(&constants!(@line $type, stringify!($name), $name));)*
+            text.push('\n');
+        }
+    };
+    (@line u32, $name:expr, $value:expr) => { format!("const uint {} = {}u;\n", $name, $value) };
+    (@line f32, $name:expr, $value:expr) => { format!("const float {} = {:?};\n", $name, $value) };
+}
+
+constants! {
+    /// Invocations of a workgroup unless a caller chooses otherwise (local_size_x_id = 0).
+    WORKGROUP: u32 = 64;
+    /// Independently scrambled batches of the low-discrepancy points; sample s belongs to batch s % BATCHES.
+    BATCHES: u32 = 8;
+    /// Consecutive samples of one batch that share a sub-pixel stratum, and so a G-buffer.
+    STRATUM: u32 = 4;
+    /// Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
+    MAX_HITS: u32 = 8;
+    /// Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
+    MAX_RAYS: u32 = 32;
+    /// Value of `Surface::triangle` for a ray that hits nothing.
+    MISS: u32 = 0xffffffffu32;
+
+    /// Projection: all techniques combined by the balance heuristic.
+    PROJECTION_MIS: u32 = 0;
+    /// Projection: the camera ray alone, first hit, as the method was given.
+    PROJECTION_CAMERA: u32 = 1;
+    /// Projection: the normal axis alone, all hits.
+    PROJECTION_NORMAL: u32 = 2;
+
+    /// No environment.
+    ENVIRONMENT_NONE: u32 = 0;
+    /// The same radiance from everywhere.
+    ENVIRONMENT_CONSTANT: u32 = 1;
+    /// A latitude-longitude image.
+    ENVIRONMENT_IMAGE: u32 = 2;
+
+    /// Material flag: light enters and leaves through this surface (a BSSRDF).
+    TRANSLUCENT: u32 = 1;
+
+    /// Light kind: position and intensity [W/sr].
+    LIGHT_POINT: u32 = 0;
+    /// Light kind: a point light with a cone.
+    LIGHT_SPOT: u32 = 1;
+    /// Light kind: direction and perpendicular irradiance [W/m^2].
+    LIGHT_DIRECTIONAL: u32 = 2;
+
+    /// Dimension: radius.
+    DIM_RADIUS: u32 = 0;
+    /// Dimension: angle in the tangent plane.
+    DIM_ANGLE: u32 = 1;
+    /// Dimension: technique (axis).
+    DIM_TECHNIQUE: u32 = 2;
+    /// Dimension: component of the radial density (channel and source).
+    DIM_COMPONENT: u32 = 3;
+    /// Dimension: which hit of the probe is lit.
+    DIM_HIT: u32 = 4;
+    /// Coordinates of the point that the host computes for each sample: the dimensions above.
+    DIMENSIONS: u32 = 5;
+    /// Dimensions 5 and 6: position within the pixel (a point per stratum, not per sample).
+    DIM_PIXEL: u32 = 5;
+    /// Dimensions 7 and 8: environment direction at the exit (a point per direction).
+    DIM_LIGHT: u32 = 7;
+    /// Dimensions 9 and 10: environment direction at the first surface (a point per direction).
+    DIM_REFLECT: u32 = 9;
+    /// Dimension of the hash that keeps hits beyond MAX_HITS.
+    DIM_OVERFLOW: u32 = 11;
+}
+
+structs! {
+    /// What is constant over a render: camera, pixels, environment, counts.
+    struct View {
+        /// A point on the camera's axis near the scene's centre; rays pass through the plane there.
+        pivot: Vec3,
+        /// From the pivot to the right edge of the full image, in that plane.
+        right: Vec3,
+        /// From the pivot to the upper edge of the full image.
+        up: Vec3,
+        /// From the eye to the pivot (perspective); a unit vector (orthographic).
+        forward: Vec3,
+        /// 1 for a perspective camera, 0 for an orthographic one.
+        perspective: f32,
+        /// Orthographic only: distance from the camera's plane to the pivot's.
+        reach: f32,
+        /// Width of the full image [pixels].
+        width: u32,
+        /// Height of the full image [pixels].
+        height: u32,
+        /// First column that is rendered.
+        crop_x: u32,
+        /// Columns that are rendered.
+        crop_width: u32,
+        /// Key of all random numbers.
+        seed: u32,
+        /// Incoming environment directions at each position, N.
+        directions: u32,
+        /// Delta lights in the scene.
+        light_count: u32,
+        /// 1 to add the environment where a camera ray hits nothing.
+        show_environment: u32,
+        /// Constant radiance, or the factor on the image's.
+        environment_scale: Vec3,
+        /// World direction to image direction: rows of a rotation.
+        environment_row0: Vec3,
+        environment_row1: Vec3,
+        environment_row2: Vec3,
+        /// Texels of the environment image.
+        environment_width: u32,
+        environment_height: u32,
+        /// Cells of the environment's sampling density.
+        density_width: u32,
+        density_height: u32,
+    }
+
+    /// What changes from dispatch to dispatch (push constants, at most 128 bytes).
+    struct Step {
+        /// First pixel row of the band, in the full image.
+        first_row: u32,
+        /// Pixels in the band.
+        pixel_count: u32,
+        /// Index of the sample: number sample_index / BATCHES of batch sample_index % BATCHES.
+        sample_index: u32,
+        /// 1 to trace `primary` through the pixel's centre, for the AOVs.
+        pixel_centre: u32,
+        /// First shadow ray of this dispatch: delta lights first, then environment directions.
+        ray_begin: u32,
+        /// Shadow rays of this dispatch; 0 where the scene has no light.
+        ray_count: u32,
+        /// 1 in the sample's first dispatch of a kernel, which also counts the sample.
+        first: u32,
+        /// First sample of the whole range that is in the sums, for `resolve`.
+        range_begin: u32,
+        /// End of that range.
+        range_end: u32,
+        /// The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
+        point: [u32; 5],
+    }
+
+    /// A triangle in the order of the BVH's leaves, for traversal.
+    struct Triangle {
+        corner: Vec3,
+        /// From the corner to the second vertex.
+        edge1: Vec3,
+        /// From the corner to the third vertex; edge1 x edge2 points out of the matter.
+        edge2: Vec3,
+        /// The set of surfaces that exchange light, to which it belongs.
+        set: u32,
+    }
+
+    /// What shading needs of a triangle, in the same order.
+    struct Shading {
+        /// Interpolated (unit, outward) normals at the three vertices.
+        normal0: Vec3,
+        normal1: Vec3,
+        normal2: Vec3,
+        /// Index of the material.
+        material: u32,
+    }
+
+    /// A material as kernels read it. Standard dipole of Jensen et al. 2001 with two sources per channel.
+    struct Material {
+        /// Effective transport coefficient of each channel, sigma_tr [1/length].
+        sigma_tr: Vec3,
+        /// Depth of the real source z_r of each channel.
+        z_real: Vec3,
+        /// Height of the virtual source z_v of each channel (positive).
+        z_virtual: Vec3,
+        /// Radiance per unit shape(r) and unit flux that entered: alpha'/2 / (pi (1 - rho_e)); /pi alone for jensen2001.
+        strength: Vec3,
+        /// Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
+        density: Vec3,
+        /// Cumulative probability of the six components, in the order R real, R virtual, G real, ... .
+        component_cdf: [f32; 6],
+        /// Radius of the ball in which probes look for surfaces.
+        radius_max: f32,
+        /// Rate of the camera projection's exponential: the smallest sigma_tr [1/length].
+        camera_rate: f32,
+        /// Index of refraction, inside over outside.
+        ior: f32,
+        /// GGX width alpha = roughness^2; 0 is a smooth mirror.
+        alpha: f32,
+        /// Linear base colour of an opaque material.
+        base_color: Vec3,
+        metallic: f32,
+        /// Emitted radiance.
+        emission: Vec3,
+        /// TRANSLUCENT or nothing.
+        flags: u32,
+    }
+
+    /// A delta light.
+    struct Light {
+        position: Vec3,
+        /// Unit vector in which the light shines (spot, directional).
+        direction: Vec3,
+        /// Point and spot: intensity x (internal units per metre)^2. Directional: perpendicular irradiance.
+        intensity: Vec3,
+        /// LIGHT_POINT, LIGHT_SPOT or LIGHT_DIRECTIONAL.
+        kind: u32,
+        /// Spot: the angular factor is saturate(cosine * scale + offset)^2.
+        spot_scale: f32,
+        spot_offset: f32,
+        /// KHR_lights_punctual range: factor max(1 - (d * inverse_range)^4, 0); 0 is infinite range.
+        inverse_range: f32,
+    }
+
+    /// The surface a camera ray meets first (the G-buffer), written by `primary`.
+    struct Surface {
+        position: Vec3,
+        /// Triangle, or MISS.
+        triangle: u32,
+        /// Weights of the second and third vertex.
+        barycentric: Vec2,
+    }
+
+    /// A probe ray, written by `sample`: all points `xo + offset + t * direction` with t in [t_min, t_max].
+    struct Probe {
+        /// From xo to the ray's origin.
+        offset: Vec3,
+        /// Unit vector.
+        direction: Vec3,
+        t_min: f32,
+        /// Below t_min for a pixel without a probe.
+        t_max: f32,
+        /// Camera projection only: radius in the tangent plane.
+        radius: f32,
+    }
+
+    /// Where a probe meets surfaces of its set, written by `reproject`.
+    struct Hits {
+        /// Hits found; the first min(count, MAX_HITS) entries are set.
+        count: u32,
+        t: [f32; 8],
+        triangle: [u32; 8],
+    }
+
+    /// Running sums of a pixel, compensated: the true sum is `x + x_carry` (Neumaier / TwoSum).
+    struct Sums {
+        /// Light that passed through translucent matter.
+        subsurface: Vec3,
+        subsurface_carry: Vec3,
+        /// Light reflected or emitted by the first surface, and the environment where it is shown.
+        reflection: Vec3,
+        reflection_carry: Vec3,
+        /// Samples added.
+        samples: u32,
+        /// Samples whose camera ray hit the scene.
+        covered: u32,
+        /// Contributions left out because they were not finite and non-negative.
+        invalid: u32,
+    }
+
+    /// A pixel of the finished image.
+    struct Pixel {
+        subsurface: Vec3,
+        reflection: Vec3,
+        /// Variance of the mean of `subsurface`, between batches; 0 with fewer than BATCHES samples.
+        variance: Vec3,
+        alpha: f32,
+        samples: u32,
+        invalid: u32,
+    }
+}
+
+buffers! {
+    /// One View.
+    Views = 0: VIEWS [View] views;
+    /// Compressed wide BVH nodes (Ylitie et al. 2017), five words each, as obvhs lays them out.
+    Nodes = 1: NODES [UVec4] nodes;
+    /// Triangles in leaf order.
+    Triangles = 2: TRIANGLES [Triangle] triangles;
+    /// Normals and material of each triangle.
+    Shadings = 3: SHADINGS [Shading] shadings;
+    /// Materials.
+    Materials = 4: MATERIALS [Material] materials;
+    /// Delta lights.
+    Lights = 5: LIGHTS [Light] lights;
+    /// Environment radiance, row by row from the zenith.
+    Environment = 6: ENVIRONMENT [Vec3] environment;
+    /// Environment sampling: density_height + 1 marginal values, then density_width + 1 for each row, all from 0 to 1.
+    EnvironmentCdf = 7: ENVIRONMENT_CDF [f32] environment_cdf;
+    /// G-buffer of the current stratum, one per pixel of the band.
+    Surfaces = 8: SURFACES [Surface] surfaces;
+    /// One per pixel of the band.
+    Probes = 9: PROBES [Probe] probes;
+    /// One per pixel of the band.
+    HitLists = 10: HIT_LISTS [Hits] hit_lists;
+    /// One per pixel of the band.
+    RunningSums = 11: RUNNING_SUMS [Sums] running_sums;
+    /// Subsurface sum of each batch: batch * pixel_count + pixel.
+    BatchSums = 12: BATCH_SUMS [Vec3] batch_sums;
+    /// The finished band.
+    Pixels = 13: PIXELS [Pixel] pixels;
+    /// Largest number of traversal steps of any invocation, by atomicMax.
+    Counters = 14: COUNTERS [u32] counters;
+}
+
+features! {
+    /// One of PROJECTION_*.
+    projection = 1: PROJECTION,
+    /// One of ENVIRONMENT_*.
+    environment = 2: ENVIRONMENT_KIND,
+    /// 1 where sums are kept by batch, for the variance.
+    batches = 3: BATCHED,
+    /// 1 to count traversal steps (tests and benchmarks).
+    counters = 4: COUNT_STEPS,
+}
+
+/// The text of `glsl/shared.glsl`.
+pub fn glsl() -> String {
+    let mut text = String::from(
+        "// What kernels and host share. Written by build.rs from src/shared.rs; do not edit.\n\
+         #extension GL_EXT_scalar_block_layout : require\n\
+         #extension GL_GOOGLE_include_directive : require\n\
+         layout(local_size_x_id = 0) in;\n\
+         #define read_write\n\n",
+    );
+    glsl_constants(&mut text);
+    glsl_features(&mut text);
+    glsl_structs(&mut text);
+    glsl_buffers(&mut text);
+    text.push_str("layout(push_constant, scalar) uniform StepBlock { Step step_; };\n");
+    text
+}
