@@ -151,6 +151,11 @@ constants! {
     MAX_HITS: u32 = 8;
     /// Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
     MAX_RAYS: u32 = 32;
+    /// Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
+    /// roundings of a position. Creases narrower than this are lit as if open.
+    SHADOW_OFFSET: f32 = 3.814697265625e-6;
+    /// Least GGX width of an opaque material, which has no mirror.
+    OPAQUE_ALPHA_MIN: f32 = 1e-3;
     /// Value of `Surface::triangle` for a ray that hits nothing.
     MISS: u32 = 0xffffffffu32;
 
