@@ -53,11 +53,14 @@ pub struct Settings {
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
     pub show_environment: bool,
+    /// Keeps the sums of each batch, from which the variance comes; of no use below `shared::BATCHES` samples.
+    pub variance: bool,
     /// Share of the profile's energy beyond the ball in which probes look for surfaces; 0 has no ball.
     /// It is the only bias of `mis` and `normal`: at most this share of the light is missed.
     pub radius_tail: f64,
-    /// Most bytes of device memory that buffers may take; without it half of the device's largest heap.
-    pub memory_budget: Option<u64>,
+    /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows. Without it 2^18, or
+    /// what the device's bindings and memory allow. The image does not depend on it.
+    pub band_pixels: Option<u32>,
     /// Invocations of a workgroup, 1 to 128; the image does not depend on it.
     pub workgroup: u32,
 }
@@ -73,8 +76,9 @@ impl Default for Settings {
             normalisation: Normalisation::Energy,
             seed: 0,
             show_environment: false,
+            variance: true,
             radius_tail: 1e-6,
-            memory_budget: None,
+            band_pixels: None,
             workgroup: shared::WORKGROUP,
         }
     }

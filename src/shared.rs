@@ -264,8 +264,10 @@ structs! {
         ray_begin: u32,
         /// Shadow rays of this dispatch; 0 where the scene has no light.
         ray_count: u32,
-        /// 1 in the sample's first dispatch of a kernel, which also counts the sample.
+        /// 1 in the sample's first dispatch of `reflect`, which also adds what does not depend on shadow rays.
         first: u32,
+        /// 1 in the sample's first dispatch of all that add to the sums: it counts the sample.
+        count: u32,
         /// First sample of the whole range that is in the sums, for `resolve`.
         range_begin: u32,
         /// End of that range.
@@ -417,7 +419,7 @@ buffers! {
     Environment = 6: ENVIRONMENT [Vec3] environment;
     /// Environment sampling: density_height + 1 marginal values, then density_width + 1 for each row, all from 0 to 1.
     EnvironmentCdf = 7: ENVIRONMENT_CDF [f32] environment_cdf;
-    /// G-buffer of the current stratum, one per pixel of the band.
+    /// G-buffer of each batch's current stratum: batch * pixel_count + pixel.
     Surfaces = 8: SURFACES [Surface] surfaces;
     /// One per pixel of the band.
     Probes = 9: PROBES [Probe] probes;

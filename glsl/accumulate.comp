@@ -1,0 +1,124 @@
+// Adds light x BSSRDF x Jacobian / density of one probe's hits to the running sums of each pixel.
+#version 460
+#include "shared.glsl"
+#include "math.glsl"
+#include "random.glsl"
+#include "pixel.glsl"
+#include "profile.glsl"
+#include "boundary.glsl"
+#include "projection.glsl"
+#include "intersect.glsl"
+#include "light.glsl"
+#include "sums.glsl"
+SHADINGS(readonly);
+MATERIALS(readonly);
+SURFACES(readonly);
+PROBES(readonly);
+HIT_LISTS(readonly);
+BATCH_SUMS(read_write);
+
+// Profile over density of the hit at xo + delta, where the camera projection's exponentials are combined.
+vec3 camera_factor(Seen s, Material m, Probe probe, vec3 delta, vec3 n) {
+    float q = camera_ratio(s, delta);
+    vec3 d = probe.direction;
+    float cos_hit = abs(dot(n, d));
+    vec3 value = m.strength * shape_shifted(m, dot(delta, delta), m.camera_rate * probe.radius);
+    // A hit in its own plane's direction has no density.
+    float jacobian = cos_hit > 0.0 && q > 0.0 ? abs(dot(s.normal, d)) / (cos_hit * q * q) : 0.0;
+    return value * (2.0 * PI * probe.radius / m.camera_rate * jacobian);
+}
+
+void main() {
+    uint index = pixel_index();
+    if (index >= step_.pixel_count) return;
+    Surface surface = surfaces[surface_index(index)];
+    bool covered = surface.triangle != MISS;
+    if (step_.count != 0) count_sample(index, covered);
+    Probe probe = probes[index];
+    uint count = hit_lists[index].count;
+    if (!covered || !(probe.t_min <= probe.t_max) || count == 0u || step_.ray_count == 0u) return;
+
+    View view = views[0];
+    Shading shading = shadings[surface.triangle];
+    Material m = materials[shading.material];
+    Seen s = seen(view, surface, triangles[surface.triangle], shading);
+    uint key = pixel_key(view.seed, pixel_position(view, index));
+    uint batch = step_.sample_index % BATCHES;
+
+    // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir).
+    uint kept = min(count, MAX_HITS);
+    float cumulative[MAX_HITS];
+    float total = 0.0;
+    for (uint j = 0; j < kept; j++) {
+        vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
+        vec3 n = geometric_normal(triangles[hit_lists[index].triangle[j]]);
+        vec3 f;
+        float p = 1.0;
+        if (PROJECTION == PROJECTION_CAMERA) {
+            f = camera_factor(s, m, probe, delta, n);
+        } else {
+            f = m.strength * shape(m, dot(delta, delta));
+            p = mixture_density(s, m, delta, n);
+        }
+        total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
+        cumulative[j] = total;
+    }
+    if (!(total > 0.0)) return;
+    float threshold = unit(scramble(step_.point[DIM_HIT], dimension_key(key, batch, DIM_HIT))) * total;
+    uint chosen = 0;
+    for (uint j = 1; j < kept; j++) {
+        if (cumulative[j - 1] <= threshold && cumulative[j] > cumulative[j - 1]) chosen = j;
+    }
+
+    vec3 delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
+    uint lit = hit_lists[index].triangle[chosen];
+    Triangle triangle = triangles[lit];
+    vec3 cross_edges = cross(triangle.edge1, triangle.edge2);
+    vec3 n = s.side * normalize(cross_edges);
+    vec3 f = PROJECTION == PROJECTION_CAMERA ? camera_factor(s, m, probe, delta, n)
+        : m.strength * shape(m, dot(delta, delta));
+    // f / p x total / (sum(f) / p): the density cancels.
+    vec3 factor = f * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
+
+    vec3 from_corner = (s.position - triangle.corner) + delta;
+    vec2 barycentric = vec2(dot(cross(from_corner, triangle.edge2), cross_edges),
+        dot(cross(triangle.edge1, from_corner), cross_edges)) / dot(cross_edges, cross_edges);
+    vec3 shading_n = s.side * interpolated_normal(shadings[lit], barycentric);
+    vec3 position = s.position + delta;
+
+    vec3 entering = vec3(0.0);
+    for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
+        vec3 direction;
+        float distance = 1e30;
+        vec3 light;
+        if (k < view.light_count) {
+            Incoming incoming = delta_light(k, position);
+            direction = incoming.direction;
+            distance = incoming.distance;
+            light = incoming.irradiance * max(dot(shading_n, direction), 0.0);
+        } else {
+            uint j = k - view.light_count;
+            vec2 u = random_point(key, batch, DIM_LIGHT, step_.sample_index / BATCHES * view.directions + j);
+            // The image and the cosine, half of the directions each, combined by the balance heuristic.
+            bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
+            if (image && u.x < 0.5) {
+                direction = draw_environment(view, vec2(2.0 * u.x, u.y));
+            } else {
+                direction = draw_cosine(shading_n, vec2(image ? 2.0 * u.x - 1.0 : u.x, u.y));
+            }
+            float c = max(dot(shading_n, direction), 0.0);
+            float over_density = PI;
+            if (image) over_density = c / (0.5 * environment_density(view, direction) + 0.5 / PI * c);
+            light = c > 0.0 ? environment_radiance(view, direction) * (over_density / float(view.directions)) : vec3(0.0);
+        }
+        float cos_shading = dot(shading_n, direction);
+        bool open = dot(n, direction) > 0.0 && cos_shading > 0.0 && light.x + light.y + light.z > 0.0;
+        traverse(Ray(position, n * SHADOW_OFFSET, direction, 0.0, open ? distance : -1.0), ANY, EVERY_SET, 0u);
+        if (open && hit_count == 0u) entering += light * transmittance(m.ior, cos_shading);
+    }
+
+    vec3 radiance = transmittance(m.ior, dot(s.shading_normal, s.wo)) * factor * entering;
+    if (!check(index, radiance)) return;
+    add_subsurface(index, radiance);
+    if (BATCHED != 0) batch_sums[batch * step_.pixel_count + index] += radiance;
+}

@@ -1,0 +1,43 @@
+// Fresnel and roughness at the surface. The mathematics is in src/reference/boundary.rs.
+
+// Unpolarised reflectance of a smooth dielectric, seen from outside; ior = inside / outside.
+float fresnel(float ior, float cos_outside) {
+    float c = clamp(cos_outside, 0.0, 1.0);
+    float g2 = ior * ior - 1.0 + c * c;
+    if (g2 <= 0.0) return 1.0;
+    float g = sqrt(g2);
+    float s = (c - g) / (c + g);
+    float p = (ior * ior * c - g) / (ior * ior * c + g);
+    return 0.5 * (s * s + p * p);
+}
+
+float transmittance(float ior, float cos_outside) {
+    return 1.0 - fresnel(ior, cos_outside);
+}
+
+// GGX normal distribution; cos_h = n.h.
+float ggx_distribution(float alpha, float cos_h) {
+    float a2 = alpha * alpha;
+    // 1 - cos^2 (1 - a2) without the cancellation near cos = 1.
+    float t = (1.0 - cos_h) * (1.0 + cos_h) + a2 * cos_h * cos_h;
+    return a2 / (PI * t * t);
+}
+
+// Smith's Lambda, for cos > 0.
+float ggx_lambda(float alpha, float c) {
+    float tan2 = (1.0 - c) * (1.0 + c) / (c * c);
+    return 0.5 * (sqrt(1.0 + alpha * alpha * tan2) - 1.0);
+}
+
+// A half vector with the density of visible normals (Heitz 2018); wo in the frame where n = z.
+vec3 draw_half_vector(vec3 wo, float alpha, vec2 u) {
+    vec3 v = normalize(vec3(alpha * wo.xy, wo.z));
+    float len2 = dot(v.xy, v.xy);
+    vec3 t1 = len2 > 0.0 ? vec3(-v.y, v.x, 0.0) / sqrt(len2) : vec3(1.0, 0.0, 0.0);
+    vec3 t2 = cross(v, t1);
+    vec2 p = sqrt(u.x) * cos_sin_2pi(u.y);
+    float s = 0.5 * (1.0 + v.z);
+    p.y = (1.0 - s) * sqrt(max(1.0 - p.x * p.x, 0.0)) + s * p.y;
+    vec3 h = p.x * t1 + p.y * t2 + sqrt(max(1.0 - dot(p, p), 0.0)) * v;
+    return normalize(vec3(alpha * h.xy, max(h.z, 0.0)));
+}

@@ -1,0 +1,145 @@
+// Rays against the compressed wide BVH (Ylitie, Karras, Laine 2017) in the node layout of obvhs: closest hit, any hit,
+// or all hits of one set in a segment. A kernel has one call site of `traverse`.
+
+NODES(readonly);
+TRIANGLES(readonly);
+COUNTERS(read_write);
+
+// All points base + offset + t direction, t in [t_min, t_max]. The offset is kept apart so that a ray close to `base`
+// meets triangles close to `base` without the rounding of their positions.
+struct Ray {
+    vec3 base;
+    vec3 offset;
+    vec3 direction;
+    float t_min;
+    float t_max;
+};
+
+const uint CLOSEST = 0;
+const uint ANY = 1;
+const uint ALL = 2;
+const uint EVERY_SET = 0xffffffffu;
+// Depth of a tree of 2^32 leaves with two children a node; the host refuses deeper ones.
+const uint STACK_SIZE = 32;
+
+// The result: CLOSEST and ANY set the first entry.
+uint hit_count;
+float hit_t[MAX_HITS];
+uint hit_triangle[MAX_HITS];
+vec2 hit_barycentric;
+
+// Bytes of a word as floats.
+vec4 unpack_bytes(uint w) {
+    return vec4(w & 255u, (w >> 8) & 255u, (w >> 16) & 255u, w >> 24);
+}
+
+// Bits of four children (half 0 or 1 of a node) that the ray meets, at their places in the node's hit mask.
+uint children_met(uint meta, uint oct_inv4, uint x_min, uint x_max, uint y_min, uint y_max, uint z_min, uint z_max,
+    bvec3 negative, vec3 scale, vec3 near, vec3 far, float t_min, float t_max) {
+    vec4 t0 = unpack_bytes(negative.x ? x_max : x_min) * scale.x + near.x;
+    vec4 t1 = unpack_bytes(negative.x ? x_min : x_max) * scale.x + far.x;
+    t0 = max(t0, unpack_bytes(negative.y ? y_max : y_min) * scale.y + near.y);
+    t1 = min(t1, unpack_bytes(negative.y ? y_min : y_max) * scale.y + far.y);
+    t0 = max(t0, unpack_bytes(negative.z ? z_max : z_min) * scale.z + near.z);
+    t1 = min(t1, unpack_bytes(negative.z ? z_min : z_max) * scale.z + far.z);
+    t0 = max(t0, vec4(t_min));
+    t1 = min(t1, vec4(t_max));
+    // Inner children lie at 24 to 31 in the order of the ray's octant, leaves at their primitives' offsets.
+    uint inner = ((meta & (meta << 1)) & 0x10101010u) >> 4;
+    uint index = (meta ^ (oct_inv4 & (inner * 255u))) & 0x1f1f1f1fu;
+    uint bits = (meta >> 5) & 0x07070707u;
+    uint mask = 0u;
+    if (t0.x <= t1.x) mask |= (bits & 255u) << (index & 255u);
+    if (t0.y <= t1.y) mask |= ((bits >> 8) & 255u) << ((index >> 8) & 255u);
+    if (t0.z <= t1.z) mask |= ((bits >> 16) & 255u) << ((index >> 16) & 255u);
+    if (t0.w <= t1.w) mask |= (bits >> 24) << (index >> 24);
+    return mask;
+}
+
+// `mode` is a constant. `key` orders the hits that are kept beyond MAX_HITS.
+void traverse(Ray ray, uint mode, uint set, uint key) {
+    hit_count = 0;
+    // A zero component would make 0 * infinity; what it is replaced by is far below rounding.
+    vec3 d = ray.direction;
+    d = vec3(abs(d.x) < 1e-20 ? 1e-20 : d.x, abs(d.y) < 1e-20 ? 1e-20 : d.y, abs(d.z) < 1e-20 ? 1e-20 : d.z);
+    vec3 inv = 1.0 / d;
+    bvec3 negative = lessThan(d, vec3(0.0));
+    uint oct_inv4 = (negative.x ? 0u : 0x04040404u) | (negative.y ? 0u : 0x02020202u) | (negative.z ? 0u : 0x01010101u);
+    vec3 origin = ray.base + ray.offset;
+    // Boxes grow by a few roundings of the origin, so that none is missed.
+    vec3 slack = abs(inv) * 4.76837158203125e-7 * (1.0 + max(abs(origin.x), max(abs(origin.y), abs(origin.z))));
+    float t_max = ray.t_max;
+
+    uvec2 stack[STACK_SIZE];
+    uint stack_size = 0;
+    uvec2 nodes_left = uvec2(0u, 0x80000000u);
+    uint steps = 0;
+    bool done = !(ray.t_min <= t_max);
+    while (!done) {
+        steps++;
+        uvec2 triangles_left = uvec2(0u);
+        if (nodes_left.y > 0x00ffffffu) {
+            uint bit = uint(findMSB(nodes_left.y));
+            uint slot = (bit - 24u) ^ (oct_inv4 & 255u);
+            // The low byte of the group says which of its children are inner nodes.
+            uint node = 5u * (nodes_left.x + uint(bitCount(nodes_left.y & ~(0xffffffffu << slot) & 255u)));
+            nodes_left.y &= ~(1u << bit);
+            if (nodes_left.y > 0x00ffffffu) stack[min(stack_size++, STACK_SIZE - 1)] = nodes_left;
+
+            uvec4 a = nodes[node], b = nodes[node + 1], x = nodes[node + 2], y = nodes[node + 3], z = nodes[node + 4];
+            vec3 extent = vec3(uintBitsToFloat((a.w & 255u) << 23), uintBitsToFloat(((a.w >> 8) & 255u) << 23),
+                uintBitsToFloat(((a.w >> 16) & 255u) << 23));
+            vec3 scale = extent * inv;
+            vec3 start = ((uintBitsToFloat(a.xyz) - ray.base) - ray.offset) * inv;
+            uint mask = children_met(b.z, oct_inv4, x.x, x.z, y.x, y.z, z.x, z.z, negative, scale, start - slack,
+                start + slack, ray.t_min, t_max);
+            mask |= children_met(b.w, oct_inv4, x.y, x.w, y.y, y.w, z.y, z.w, negative, scale, start - slack,
+                start + slack, ray.t_min, t_max);
+            nodes_left = uvec2(b.x, (mask & 0xff000000u) | (a.w >> 24));
+            triangles_left = uvec2(b.y, mask & 0x00ffffffu);
+        }
+        while (triangles_left.y != 0u) {
+            steps++;
+            uint bit = uint(findLSB(triangles_left.y));
+            triangles_left.y &= triangles_left.y - 1u;
+            uint index = triangles_left.x + bit;
+            Triangle triangle = triangles[index];
+            // Moeller and Trumbore 1997.
+            vec3 p = cross(ray.direction, triangle.edge2);
+            float determinant = dot(triangle.edge1, p);
+            float inv_determinant = 1.0 / determinant;
+            vec3 s = (ray.base - triangle.corner) + ray.offset;
+            float u = dot(s, p) * inv_determinant;
+            vec3 q = cross(s, triangle.edge1);
+            float v = dot(ray.direction, q) * inv_determinant;
+            float t = dot(triangle.edge2, q) * inv_determinant;
+            bool hit = determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= ray.t_min && t <= t_max;
+            if (set != EVERY_SET) hit = hit && triangle.set == set;
+            if (mode == ALL) {
+                uint n = hit_count + 1u;
+                // Beyond MAX_HITS each hit is kept with probability MAX_HITS / n (Vitter's algorithm R).
+                uint slot = n <= MAX_HITS ? n - 1u : hash(key + n) % n;
+                if (hit && slot < MAX_HITS) {
+                    hit_t[slot] = t;
+                    hit_triangle[slot] = index;
+                }
+                hit_count += hit ? 1u : 0u;
+            } else if (hit) {
+                t_max = t;
+                hit_count = 1u;
+                hit_t[0] = t;
+                hit_triangle[0] = index;
+                hit_barycentric = vec2(u, v);
+                if (mode == ANY) break;
+            }
+        }
+        if (mode == ANY && hit_count != 0u) break;
+        if (nodes_left.y <= 0x00ffffffu) {
+            if (stack_size == 0u)
+                done = true;
+            else
+                nodes_left = stack[--stack_size];
+        }
+    }
+    if (COUNT_STEPS != 0) atomicMax(counters[0], steps);
+}

@@ -1,0 +1,39 @@
+// Finds the surface that a pixel sees through the sub-pixel position of the current stratum.
+#version 460
+#include "shared.glsl"
+#include "math.glsl"
+#include "random.glsl"
+#include "pixel.glsl"
+#include "intersect.glsl"
+SURFACES(writeonly);
+
+void main() {
+    uint index = pixel_index();
+    if (index >= step_.pixel_count) return;
+    View view = views[0];
+    uvec2 pixel = pixel_position(view, index);
+    vec2 within = vec2(0.5);
+    if (step_.pixel_centre == 0) {
+        uint stratum = step_.sample_index / BATCHES / STRATUM;
+        within = random_point(pixel_key(view.seed, pixel), step_.sample_index % BATCHES, DIM_PIXEL, stratum);
+    }
+    vec2 ndc = 2.0 * (vec2(pixel) + within) / vec2(view.width, view.height) - 1.0;
+    // The ray starts on the plane through the pivot, near the scene, so that a far eye costs no digits.
+    vec3 on_plane = ndc.x * view.right - ndc.y * view.up;
+    vec3 to = view.forward + view.perspective * on_plane;
+    float len = length(to);
+    float reach = view.perspective != 0.0 ? len : view.reach;
+    traverse(Ray(view.pivot + on_plane, vec3(0.0), to / len, -reach, 1e30), CLOSEST, EVERY_SET, 0u);
+
+    Surface surface;
+    surface.position = vec3(0.0);
+    surface.triangle = MISS;
+    surface.barycentric = vec2(0.0);
+    if (hit_count != 0) {
+        Triangle triangle = triangles[hit_triangle[0]];
+        surface.position = triangle.corner + (hit_barycentric.x * triangle.edge1 + hit_barycentric.y * triangle.edge2);
+        surface.triangle = hit_triangle[0];
+        surface.barycentric = hit_barycentric;
+    }
+    surfaces[surface_index(index)] = surface;
+}

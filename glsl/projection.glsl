@@ -1,0 +1,87 @@
+// The surface seen by a pixel, the axes along which its tangent plane is projected, and the density of a projected
+// point. The mathematics is in src/reference/projection.rs.
+
+// What a pixel's stages need to know of its surface.
+struct Seen {
+    vec3 position;
+    // Unit vector to the eye.
+    vec3 wo;
+    // From the eye, or from the camera's plane.
+    float eye_distance;
+    // 1 / eye_distance for a perspective camera, 0 for an orthographic one.
+    float inverse_distance;
+    // -1 where the camera sees the inner side: then the whole set is turned inside out.
+    float side;
+    // Geometric and interpolated normal, towards the eye.
+    vec3 normal;
+    vec3 shading_normal;
+};
+
+vec3 interpolated_normal(Shading s, vec2 barycentric) {
+    return normalize(s.normal0 * (1.0 - barycentric.x - barycentric.y) + s.normal1 * barycentric.x + s.normal2 * barycentric.y);
+}
+
+vec3 geometric_normal(Triangle t) {
+    return normalize(cross(t.edge1, t.edge2));
+}
+
+Seen seen(View view, Surface surface, Triangle triangle, Shading shading) {
+    Seen s;
+    s.position = surface.position;
+    vec3 from_pivot = surface.position - view.pivot;
+    vec3 to = view.forward + view.perspective * from_pivot;
+    float len = length(to);
+    s.wo = -to / len;
+    s.eye_distance = view.perspective != 0.0 ? len : view.reach + dot(from_pivot, view.forward);
+    s.inverse_distance = view.perspective / len;
+    vec3 n = geometric_normal(triangle);
+    s.side = dot(n, s.wo) < 0.0 ? -1.0 : 1.0;
+    s.normal = s.side * n;
+    s.shading_normal = s.side * interpolated_normal(shading, surface.barycentric);
+    // An interpolated normal may face away where the triangle does not.
+    if (!(dot(s.shading_normal, s.wo) > 0.0)) s.shading_normal = s.normal;
+    return s;
+}
+
+const uint TECHNIQUE_NORMAL = 0;
+const uint TECHNIQUE_U = 1;
+const uint TECHNIQUE_V = 2;
+const uint TECHNIQUE_CAMERA = 3;
+
+// Fractions of the techniques normal, U, V and camera, from the cosine to the eye alone.
+vec4 technique_fractions(float cos_eye) {
+    if (PROJECTION == PROJECTION_NORMAL) return vec4(1.0, 0.0, 0.0, 0.0);
+    if (PROJECTION == PROJECTION_CAMERA) return vec4(0.0, 0.0, 0.0, 1.0);
+    float s = clamp(cos_eye / 0.3, 0.0, 1.0);
+    float camera = 0.4 * s * s * (3.0 - 2.0 * s);
+    float rest = 1.0 - camera;
+    return vec4(rest * (2.0 / 3.0), rest / 6.0, rest / 6.0, camera);
+}
+
+// Where the camera ray through xo + delta crosses the tangent plane: dist_tan / dist, and 0 behind the eye.
+float camera_ratio(Seen s, vec3 delta) {
+    float k = 1.0 - dot(delta, s.normal) * s.inverse_distance / dot(s.wo, s.normal);
+    return k > 0.0 ? 1.0 / k : 0.0;
+}
+
+// Density per area of the surface, over all techniques, of the point xo + delta with geometric normal n.
+float mixture_density(Seen s, Material m, vec3 delta, vec3 n) {
+    vec3 tangent, bitangent;
+    orthonormal_basis(s.normal, tangent, bitangent);
+    vec4 fractions = technique_fractions(dot(s.wo, s.normal));
+    // Coordinates in the frame: squared radii about the axes without cancellation.
+    vec3 x = vec3(dot(delta, tangent), dot(delta, bitangent), dot(delta, s.normal));
+    vec3 x2 = x * x;
+    float p = fractions.x * radial_density(m, x2.x + x2.y) * abs(dot(n, s.normal));
+    if (PROJECTION == PROJECTION_MIS) {
+        p += fractions.y * radial_density(m, x2.y + x2.z) * abs(dot(n, tangent));
+        p += fractions.z * radial_density(m, x2.z + x2.x) * abs(dot(n, bitangent));
+        float q = camera_ratio(s, delta);
+        vec3 y = q * (delta - s.wo * (x.z / dot(s.wo, s.normal)));
+        vec3 d = normalize(delta * s.inverse_distance - s.wo);
+        float cos_plane = abs(dot(s.normal, d));
+        float jacobian = cos_plane > 0.0 ? abs(dot(n, d)) / cos_plane * q * q : 0.0;
+        p += fractions.w * radial_density(m, dot(y, y)) * jacobian;
+    }
+    return p;
+}

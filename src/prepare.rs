@@ -1,0 +1,229 @@
+//! A scene and settings become what kernels read: f64 metres in, shared structs in internal units out.
+
+use crate::{
+    error::{Error, Result},
+    reference::{Inputs, light, profile},
+    scene::{Camera, EnvironmentMap, Frame, Lens, LightKind, Scene},
+    settings::{Projection, Settings},
+    shared::{self, Features, Light, Material, View},
+};
+use glam::{DVec3, Vec3};
+
+/// Everything that kernels read and that a scene and its settings determine, but for the geometry.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    pub features: Features,
+    pub view: View,
+    pub materials: Vec<Material>,
+    pub lights: Vec<Light>,
+    pub environment: Vec<Vec3>,
+    pub environment_cdf: Vec<f32>,
+    /// The camera that looks, for what is said about the image.
+    pub camera: Camera,
+    /// Rows that are rendered: from the first, exclusive of the last.
+    pub rows: std::ops::Range<u32>,
+    /// Whether any material scatters light: otherwise the three kernels do not run.
+    pub has_translucent: bool,
+    /// Whether light can leave a first surface without having entered it, or the environment is shown: otherwise
+    /// `reflect` does not run.
+    pub has_reflection: bool,
+    /// Shadow rays of one position: delta lights, then environment directions.
+    pub ray_count: u32,
+}
+
+impl Prepared {
+    /// The buffers as the twins read them.
+    pub fn inputs<'a>(&'a self, scene: &'a Scene) -> Inputs<'a> {
+        Inputs {
+            features: self.features,
+            view: &self.view,
+            triangles: &scene.triangles,
+            shadings: &scene.shadings,
+            materials: &self.materials,
+            lights: &self.lights,
+            environment: &self.environment,
+            environment_cdf: &self.environment_cdf,
+        }
+    }
+}
+
+/// Width and height of the full image that `settings` ask for.
+pub fn resolution(scene: &Scene, settings: &Settings) -> Result<(u32, u32)> {
+    let (width, height) = match settings.resolution {
+        Some(resolution) => resolution,
+        None => {
+            let camera = scene.camera(&settings.camera, 1.0)?;
+            let aspect = match camera.lens {
+                Lens::Perspective { aspect, .. } => aspect.unwrap_or(1.0),
+                Lens::Orthographic { xmag, ymag } => xmag / ymag,
+            };
+            (((1024.0 * aspect).round()).clamp(1.0, MAX_SIDE as f64) as u32, 1024)
+        }
+    };
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
+        return Err(Error::setting("resolution", format!("{width}x{height} is not between 1x1 and {MAX_SIDE}x{MAX_SIDE}")));
+    }
+    Ok((width, height))
+}
+
+/// Longest side of an image [pixels].
+pub const MAX_SIDE: u32 = 65_536;
+
+/// Checks the settings against the scene and fills the shared structs.
+///
+/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions or projection cannot be had.
+pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
+    let (width, height) = resolution(scene, settings)?;
+    let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, width, height]);
+    if x0 >= x1 || y0 >= y1 || x1 > width || y1 > height {
+        let problem = format!("{x0},{y0},{x1},{y1} is not a part of {width}x{height} pixels");
+        return Err(Error::setting("crop", problem));
+    }
+    if !(1..=65_536).contains(&settings.directions) {
+        return Err(Error::setting("directions", format!("{} is not between 1 and 65536", settings.directions)));
+    }
+    if !(settings.radius_tail >= 0.0 && settings.radius_tail < 0.1) {
+        return Err(Error::setting("radius tail", format!("{} is not in [0, 0.1)", settings.radius_tail)));
+    }
+
+    let materials = scene.materials.iter().map(|m| material(m, scene.frame, settings)).collect::<Result<Vec<_>>>()?;
+    let frame = scene.frame;
+    let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
+    let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
+
+    let mut view = view_of(&camera, frame, width, height);
+    view.crop_x = x0;
+    view.crop_width = x1 - x0;
+    view.seed = settings.seed;
+    view.directions = settings.directions;
+    view.light_count = lights.len() as u32;
+    view.show_environment = u32::from(settings.show_environment);
+
+    let map = &scene.environment;
+    let scale = map.scale as f32;
+    let rotation = glam::DMat3::from_rotation_y(-map.rotation.to_radians());
+    view.environment_row0 = rotation.row(0).as_vec3();
+    view.environment_row1 = rotation.row(1).as_vec3();
+    view.environment_row2 = rotation.row(2).as_vec3();
+    let (kind, environment, environment_cdf) = match &map.map {
+        EnvironmentMap::None => (shared::ENVIRONMENT_NONE, vec![], vec![]),
+        EnvironmentMap::Constant(radiance) => {
+            view.environment_scale = radiance.as_vec3() * scale;
+            (shared::ENVIRONMENT_CONSTANT, vec![], vec![])
+        }
+        EnvironmentMap::Image { width, height, radiance } => {
+            let (table, density_width, density_height) = light::environment_cdf(radiance, *width, *height);
+            view.environment_scale = Vec3::splat(scale);
+            (view.environment_width, view.environment_height) = (*width, *height);
+            (view.density_width, view.density_height) = (density_width, density_height);
+            (shared::ENVIRONMENT_IMAGE, radiance.clone(), table)
+        }
+    };
+
+    let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some() == flag);
+    let emits = scene.materials.iter().any(|m| m.emission != DVec3::ZERO);
+    let rough = scene.materials.iter().any(|m| m.roughness > 0.0);
+    Ok(Prepared {
+        features: Features {
+            projection: settings.projection as u32,
+            environment: kind,
+            batches: u32::from(settings.variance),
+            counters: 0,
+        },
+        view,
+        materials,
+        has_translucent: used(true),
+        has_reflection: used(false)
+            || emits
+            || settings.show_environment
+            || kind != shared::ENVIRONMENT_NONE
+            || !lights.is_empty() && rough,
+        ray_count: lights.len() as u32 + if kind == shared::ENVIRONMENT_NONE { 0 } else { settings.directions },
+        lights,
+        environment,
+        environment_cdf,
+        camera,
+        rows: y0..y1,
+    })
+}
+
+/// The camera's part of a View, in internal units.
+fn view_of(camera: &Camera, frame: Frame, width: u32, height: u32) -> View {
+    let eye = (camera.eye - frame.centre) * frame.scale;
+    // Rays start on a plane near the scene, so that a far eye costs no digits; a near eye needs no such plane.
+    let depth = (-eye).dot(camera.forward).max(1.0);
+    let aspect = f64::from(width) / f64::from(height);
+    let (half_height, forward, perspective) = match camera.lens {
+        Lens::Perspective { yfov, .. } => (depth * (0.5 * yfov).tan(), camera.forward * depth, 1.0),
+        Lens::Orthographic { ymag, .. } => (ymag * frame.scale, camera.forward, 0.0),
+    };
+    View {
+        pivot: (eye + camera.forward * depth).as_vec3(),
+        right: (camera.right * half_height * aspect).as_vec3(),
+        up: (camera.up * half_height).as_vec3(),
+        forward: forward.as_vec3(),
+        perspective,
+        reach: depth as f32,
+        width,
+        height,
+        ..View::default()
+    }
+}
+
+fn delta_light(light: &crate::scene::Light, frame: Frame) -> Light {
+    let mut out = Light {
+        position: ((light.position - frame.centre) * frame.scale).as_vec3(),
+        direction: light.direction.as_vec3(),
+        inverse_range: light.range.map_or(0.0, |range| 1.0 / (range * frame.scale)) as f32,
+        ..Light::default()
+    };
+    // Intensity over squared distance, with the distance in internal units.
+    let squared_scale = frame.scale * frame.scale;
+    match light.kind {
+        LightKind::Directional => {
+            out.kind = shared::LIGHT_DIRECTIONAL;
+            out.intensity = light.intensity.as_vec3();
+        }
+        LightKind::Point => {
+            out.kind = shared::LIGHT_POINT;
+            out.intensity = (light.intensity * squared_scale).as_vec3();
+        }
+        LightKind::Spot { inner, outer } => {
+            out.kind = shared::LIGHT_SPOT;
+            out.intensity = (light.intensity * squared_scale).as_vec3();
+            // The factor of KHR_lights_punctual, with its least width of the cone's edge.
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+            out.spot_scale = scale as f32;
+            out.spot_offset = (-outer.cos() * scale) as f32;
+        }
+    }
+    out
+}
+
+fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings) -> Result<Material> {
+    let mut out = match &material.medium {
+        None => Material::default(),
+        Some(medium) => {
+            // Coefficients per internal unit.
+            let sigma_s_prime = medium.sigma_s_prime / frame.scale;
+            let sigma_a = medium.sigma_a / frame.scale;
+            let normalisation = settings.normalisation;
+            let mut out = profile::material(sigma_s_prime, sigma_a, material.ior, normalisation, settings.radius_tail);
+            out.flags = shared::TRANSLUCENT;
+            if settings.projection == Projection::Camera && out.component_cdf[5] > 0.0 && out.camera_rate <= 0.0 {
+                let problem = format!(
+                    "camera needs sigma_tr > 0 in every channel, but material \"{}\" ({}) absorbs nothing in one; use mis or normal",
+                    material.name, medium.source
+                );
+                return Err(Error::setting("projection", problem));
+            }
+            out
+        }
+    };
+    out.ior = material.ior as f32;
+    out.alpha = (material.roughness * material.roughness) as f32;
+    out.base_color = material.base_color.as_vec3();
+    out.metallic = material.metallic as f32;
+    out.emission = material.emission.as_vec3();
+    Ok(out)
+}

@@ -1,0 +1,171 @@
+//! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it.
+
+use super::{Renderer, spirv_hash};
+use crate::{
+    error::Result,
+    gpu::download,
+    image::{Attribute, Channel, Image},
+    shared::{BATCHES, MISS, Pixel, Slot, Step, Surface},
+};
+use glam::{DVec3, Vec3};
+use std::collections::BTreeMap;
+
+/// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z, samples,
+/// material. Leaves the sums as they are.
+pub fn image(renderer: &mut Renderer) -> Result<Image> {
+    let view = renderer.prepared.view;
+    let rows = renderer.prepared.rows.clone();
+    let count = (view.crop_width * (rows.end - rows.start)) as usize;
+    let range = renderer.samples();
+    let has_variance = renderer.prepared.features.batches != 0 && range.end - range.start >= BATCHES;
+
+    let mut channels = Channels::new(count, has_variance);
+    let mut invalid = 0u64;
+    for band in 0..renderer.bands.len() {
+        renderer.make_resident(band)?;
+        let end = renderer.bands[band].end;
+        let pixels = renderer.bands[band].pixels;
+        let step = Step {
+            first_row: renderer.bands[band].first_row,
+            pixel_count: pixels,
+            pixel_centre: 1,
+            range_begin: range.start,
+            range_end: end,
+            ..Step::default()
+        };
+        // The G-buffer of batch 0 is overwritten; its stratum is traced anew before the next sample.
+        renderer.strata[0] = None;
+        let Renderer { recorder, kernels, bindings, .. } = renderer;
+        recorder.begin()?;
+        recorder.dispatch(&kernels.resolve, bindings, pixels, &step)?;
+        recorder.dispatch(&kernels.primary, bindings, pixels, &step)?;
+        recorder.submit_and_wait()?;
+        let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels)?;
+        let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels)?;
+        for (pixel, surface) in resolved.iter().zip(&surfaces) {
+            invalid += u64::from(pixel.invalid);
+            channels.push(pixel, &centre(renderer, surface));
+        }
+    }
+    Ok(Image {
+        width: view.crop_width,
+        height: rows.end - rows.start,
+        origin: (view.crop_x, rows.start),
+        full: (view.width, view.height),
+        channels: channels.list,
+        attributes: attributes(renderer, invalid, has_variance),
+    })
+}
+
+fn read<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot, pixels: u32) -> Result<Vec<T>> {
+    let Some(buffer) = renderer.buffer(slot) else { return Ok(vec![]) };
+    let bytes = download(&renderer.device, buffer, u64::from(pixels) * slot.stride() as u64)?;
+    Ok(bytemuck::pod_collect_to_vec(&bytes))
+}
+
+/// What the middle of a pixel shows.
+struct Centre {
+    normal: Vec3,
+    /// World position [m].
+    position: DVec3,
+    /// Distance along the view axis [m].
+    depth: f64,
+    /// Index of the material, -1 for none.
+    material: i32,
+}
+
+fn centre(renderer: &Renderer, surface: &Surface) -> Centre {
+    if surface.triangle == MISS {
+        return Centre { normal: Vec3::ZERO, position: DVec3::ZERO, depth: 0.0, material: -1 };
+    }
+    let triangle = &renderer.scene.triangles[surface.triangle as usize];
+    let shading = &renderer.scene.shadings[surface.triangle as usize];
+    let [b1, b2] = surface.barycentric.to_array();
+    let normal = (shading.normal0 * (1.0 - b1 - b2) + shading.normal1 * b1 + shading.normal2 * b2).normalize();
+    let frame = renderer.scene.frame;
+    let position = surface.position.as_dvec3() / frame.scale + frame.centre;
+    let camera = &renderer.prepared.camera;
+    // Towards the eye, as the kernels turn it.
+    let view = &renderer.prepared.view;
+    let to = view.forward + view.perspective * (surface.position - view.pivot);
+    let inner = triangle.edge1.cross(triangle.edge2).dot(to) > 0.0;
+    Centre {
+        normal: if inner { -normal } else { normal },
+        position,
+        depth: (position - camera.eye).dot(camera.forward),
+        material: shading.material as i32,
+    }
+}
+
+/// The channels in the order in which they are filled.
+struct Channels {
+    list: Vec<Channel>,
+    has_variance: bool,
+}
+
+impl Channels {
+    fn new(count: usize, has_variance: bool) -> Channels {
+        let mut names = vec!["R", "G", "B", "A"];
+        names.extend(["subsurface.R", "subsurface.G", "subsurface.B", "reflection.R", "reflection.G", "reflection.B"]);
+        names.extend(["N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "Z", "samples.Y", "material.Y"]);
+        if has_variance {
+            names.extend(["variance.R", "variance.G", "variance.B"]);
+        }
+        let channel = |name: &&str| Channel { name: name.to_string(), data: Vec::with_capacity(count) };
+        Channels { list: names.iter().map(channel).collect(), has_variance }
+    }
+
+    fn push(&mut self, pixel: &Pixel, centre: &Centre) {
+        let light = pixel.subsurface + pixel.reflection;
+        let position = centre.position.as_vec3();
+        let mut values = Vec::with_capacity(self.list.len());
+        values.extend(light.to_array());
+        values.push(pixel.alpha);
+        values.extend(pixel.subsurface.to_array());
+        values.extend(pixel.reflection.to_array());
+        values.extend(centre.normal.to_array());
+        values.extend(position.to_array());
+        values.extend([centre.depth as f32, pixel.samples as f32, centre.material as f32]);
+        if self.has_variance {
+            values.extend(pixel.variance.to_array());
+        }
+        for (channel, value) in self.list.iter_mut().zip(values) {
+            channel.data.push(value);
+        }
+    }
+}
+
+fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
+    let range = renderer.samples();
+    let settings = &renderer.settings;
+    let info = renderer.device.info();
+    // What must agree between parts of one image; the seed stands apart.
+    let described = serde_json::json!({
+        "resolution": [renderer.prepared.view.width, renderer.prepared.view.height],
+        "camera": renderer.prepared.camera.name,
+        "directions": settings.directions,
+        "projection": format!("{:?}", settings.projection).to_lowercase(),
+        "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
+        "model": "standard",
+        "radiusTail": settings.radius_tail,
+        "showEnvironment": settings.show_environment,
+    });
+    let mut attributes: Vec<(&str, Attribute)> = vec![
+        ("samples", Attribute::Integer((range.end - range.start) as i32)),
+        ("sampleBegin", Attribute::Integer(range.start as i32)),
+        ("sampleEnd", Attribute::Integer(range.end as i32)),
+        ("seed", Attribute::Integer(settings.seed as i32)),
+        ("version", Attribute::Text(env!("CARGO_PKG_VERSION").into())),
+        ("spirvHash", Attribute::Text(spirv_hash())),
+        ("device", Attribute::Text(info.name.clone())),
+        ("driver", Attribute::Text(info.driver.clone())),
+        ("sceneHash", Attribute::Text(renderer.scene.hash.clone())),
+        ("settings", Attribute::Text(described.to_string())),
+        ("invalidSamples", Attribute::Integer(invalid.min(i32::MAX as u64) as i32)),
+    ];
+    if !has_variance {
+        let why = format!("absent: fewer than {BATCHES} samples");
+        attributes.push(("variance", Attribute::Text(why)));
+    }
+    attributes.into_iter().map(|(name, value)| (format!("translucent.{name}"), value)).collect()
+}

@@ -1,0 +1,77 @@
+//! How an image is cut into bands of rows that fit the device, and where a band's sums are.
+
+use crate::{
+    error::{Error, Result},
+    gpu::Device,
+    prepare::Prepared,
+    settings::Settings,
+    shared::{BATCHES, Slot},
+};
+
+/// Pixels of a band where nothing else limits it: enough to fill a GPU, few enough for a processor's caches.
+const BAND_PIXELS: u32 = 1 << 18;
+
+/// Consecutive rows that the device works on at a time.
+pub struct Band {
+    /// In the full image.
+    pub first_row: u32,
+    pub pixels: u32,
+    /// End of the samples in its sums.
+    pub end: u32,
+    pub film: Film,
+}
+
+/// A band's sums.
+pub enum Film {
+    /// No sample yet.
+    Empty,
+    OnDevice,
+    /// RunningSums and BatchSums as bytes.
+    OnHost([Vec<u8>; 2]),
+}
+
+/// The buffers with elements for each pixel of a band that a render needs.
+pub fn slots(prepared: &Prepared) -> Vec<Slot> {
+    let mut slots = vec![Slot::Surfaces, Slot::RunningSums, Slot::Pixels];
+    if prepared.has_translucent {
+        slots.extend([Slot::Probes, Slot::HitLists]);
+    }
+    if prepared.features.batches != 0 {
+        slots.push(Slot::BatchSums);
+    }
+    slots
+}
+
+/// Bytes that a slot takes for each pixel of a band.
+pub fn bytes_per_pixel(slot: Slot) -> u64 {
+    let elements = if matches!(slot, Slot::Surfaces | Slot::BatchSums) { BATCHES } else { 1 };
+    u64::from(elements) * slot.stride() as u64
+}
+
+/// Cuts the rendered rows into bands of nearly equal size.
+pub fn split(device: &Device, prepared: &Prepared, settings: &Settings) -> Result<Vec<Band>> {
+    let slots = slots(prepared);
+    let widest = slots.iter().map(|slot| bytes_per_pixel(*slot)).max().unwrap_or(1);
+    let whole: u64 = slots.iter().map(|slot| bytes_per_pixel(*slot)).sum();
+    // Half of the heap is left to the scene and to others.
+    let limit = (device.max_storage_buffer_range() / widest).min(device.heap_size() / 2 / whole);
+    let wanted = settings.band_pixels.unwrap_or(BAND_PIXELS).max(1);
+    let width = prepared.view.crop_width;
+    if u64::from(width) > limit {
+        return Err(Error::Memory {
+            step: "cut the image into bands".into(),
+            problem: format!("a row of {width} pixels needs more than the device binds; lower the resolution or crop"),
+        });
+    }
+    let rows = prepared.rows.end - prepared.rows.start;
+    let most = (u64::from(wanted).min(limit) / u64::from(width)).clamp(1, u64::from(rows)) as u32;
+    let count = rows.div_ceil(most);
+    Ok((0..count)
+        .map(|band| {
+            let edge = |band: u32| (u64::from(rows) * u64::from(band) / u64::from(count)) as u32;
+            let (first, end) = (edge(band), edge(band + 1));
+            let pixels = (end - first) * width;
+            Band { first_row: prepared.rows.start + first, pixels, end: 0, film: Film::Empty }
+        })
+        .collect())
+}

@@ -1,0 +1,335 @@
+//! The renderer: buffers made once per scene and resolution, and the order of the kernels.
+
+mod assemble;
+mod bands;
+
+use crate::{
+    error::{Error, Result},
+    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
+    image::Image,
+    prepare::{Prepared, prepare},
+    reference::random,
+    scene::Scene,
+    settings::Settings,
+    shared::{BATCHES, Features, MAX_RAYS, STRATUM, Slot, Step},
+};
+use bands::{Band, Film};
+use std::ops::{ControlFlow, Range};
+
+/// Samples between two visits of a band when an image has several: each batch passes through one stratum.
+const PASS: u32 = BATCHES * STRATUM;
+
+/// Pixel samples of one submission: about a second of software Vulkan, milliseconds of a GPU.
+const SUBMISSION: u64 = 1 << 20;
+
+macro_rules! kernels {
+    ($($stem:ident),*) => {
+        /// The compute pipelines that a scene needs, specialised to its features.
+        pub struct Kernels { $($stem: Kernel,)* }
+
+        impl Kernels {
+            fn new(layout: &Layout, features: &Features, workgroup: u32) -> Result<Kernels> {
+                Ok(Kernels { $($stem: Kernel::new(
+                    layout,
+                    stringify!($stem),
+                    include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv")),
+                    features,
+                    workgroup,
+                )?,)* })
+            }
+        }
+
+        /// Stem and SPIR-V of every kernel.
+        pub const SPIRV: &[(&str, &[u8])] =
+            &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
+    };
+}
+kernels!(primary, sample, reproject, accumulate, reflect, resolve);
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Pixel samples done, over all bands.
+    pub done: u64,
+    /// Pixel samples asked for.
+    pub total: u64,
+}
+
+/// Renders one scene with one set of settings. Samples add up over calls until [`Renderer::reset`].
+pub struct Renderer {
+    device: Device,
+    scene: Scene,
+    settings: Settings,
+    prepared: Prepared,
+    kernels: Kernels,
+    bindings: Bindings,
+    recorder: Recorder,
+    buffers: Vec<(Slot, Buffer)>,
+    bands: Vec<Band>,
+    /// Band and samples whose G-buffers the device holds: batch b is at stratum `strata[b]`.
+    resident: Option<usize>,
+    strata: [Option<u32>; BATCHES as usize],
+    /// First sample of the sums.
+    begin: Option<u32>,
+}
+
+impl Renderer {
+    /// Checks the settings, uploads the scene and makes every buffer and pipeline that rendering needs.
+    ///
+    /// Fails if the settings do not fit the scene, or a buffer does not fit the device.
+    pub fn new(device: &Device, scene: &Scene, settings: &Settings) -> Result<Renderer> {
+        let prepared = prepare(scene, settings)?;
+        Renderer::with_features(device, scene, settings, prepared)
+    }
+
+    /// As [`Renderer::new`], with traversal steps counted.
+    pub fn counting(device: &Device, scene: &Scene, settings: &Settings) -> Result<Renderer> {
+        let mut prepared = prepare(scene, settings)?;
+        prepared.features.counters = 1;
+        Renderer::with_features(device, scene, settings, prepared)
+    }
+
+    fn with_features(device: &Device, scene: &Scene, settings: &Settings, prepared: Prepared) -> Result<Renderer> {
+        if !(1..=128).contains(&settings.workgroup) {
+            return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
+        }
+        let layout = Layout::new(device)?;
+        let kernels = Kernels::new(&layout, &prepared.features, settings.workgroup)?;
+        let mut buffers = Vec::new();
+        for (slot, data) in scene_data(scene, &prepared) {
+            let limit = device.max_storage_buffer_range();
+            if data.len() as u64 > limit {
+                return Err(Error::Memory {
+                    step: format!("create buffer {}", slot.name()),
+                    problem: format!("it takes {} bytes, and the device binds {limit} at most", data.len()),
+                });
+            }
+            let buffer = Buffer::new(device, slot.name(), data.len() as u64, Location::Device)?;
+            upload(device, &buffer, data)?;
+            buffers.push((slot, buffer));
+        }
+        let bands = bands::split(device, &prepared, settings)?;
+        let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
+        for slot in bands::slots(&prepared) {
+            let bytes = bands::bytes_per_pixel(slot) * u64::from(pixels);
+            buffers.push((slot, Buffer::new(device, slot.name(), bytes, Location::Device)?));
+        }
+        let counters = Buffer::new(device, Slot::Counters.name(), 4, Location::Device)?;
+        upload(device, &counters, bytemuck::bytes_of(&0u32))?;
+        buffers.push((Slot::Counters, counters));
+        let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
+        let bindings = Bindings::new(&layout, &bound)?;
+        Ok(Renderer {
+            device: device.clone(),
+            scene: scene.clone(),
+            settings: settings.clone(),
+            prepared,
+            kernels,
+            bindings,
+            recorder: Recorder::new(device)?,
+            buffers,
+            bands,
+            resident: None,
+            strata: [None; BATCHES as usize],
+            begin: None,
+        })
+    }
+
+    /// What kernels read, but for the geometry.
+    pub fn prepared(&self) -> &Prepared {
+        &self.prepared
+    }
+
+    /// Adds the next `samples` samples.
+    pub fn render(&mut self, samples: u32) -> Result<()> {
+        let begin = self.samples().end;
+        self.render_range(begin..begin.saturating_add(samples), &mut |_| ControlFlow::Continue(()))?;
+        Ok(())
+    }
+
+    /// The samples that every pixel has; some may have up to 32 more after an interruption.
+    pub fn samples(&self) -> Range<u32> {
+        let begin = self.begin.unwrap_or(0);
+        begin..self.bands.iter().map(|band| band.end).min().unwrap_or(begin)
+    }
+
+    /// Forgets every sample.
+    pub fn reset(&mut self) {
+        self.begin = None;
+        self.resident = None;
+        for band in &mut self.bands {
+            band.film = Film::Empty;
+            band.end = 0;
+        }
+    }
+
+    /// Adds the samples of `range`, which follows what is there. `progress` is called after each submission and may
+    /// stop the render; then each pixel has at least one sample. Returns whether the range was finished.
+    pub fn render_range(
+        &mut self,
+        range: Range<u32>,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<bool> {
+        if range.start >= range.end {
+            return Err(Error::setting("samples", format!("{}:{} holds no sample", range.start, range.end)));
+        }
+        if self.begin.is_some() && self.bands.iter().any(|band| band.end != range.start) {
+            let problem = format!("{}:{} does not follow {:?}", range.start, range.end, self.samples());
+            return Err(Error::setting("samples", problem));
+        }
+        if self.begin.is_none() {
+            self.begin = Some(range.start);
+            self.bands.iter_mut().for_each(|band| band.end = range.start);
+        }
+        let pixels: u64 = self.bands.iter().map(|band| u64::from(band.pixels)).sum();
+        let mut state = Progress { done: 0, total: pixels * u64::from(range.end - range.start) };
+        let mut stop = false;
+        let mut pass = range.start..range.start + 1;
+        while !pass.is_empty() {
+            for band in 0..self.bands.len() {
+                let mut next = pass.start;
+                self.make_resident(band)?;
+                while next < pass.end && !(stop && pass.start > range.start) {
+                    let count = (SUBMISSION / u64::from(self.bands[band].pixels)).clamp(1, u64::from(PASS)) as u32;
+                    let end = pass.end.min(next.saturating_add(count));
+                    self.submit_samples(band, next..end)?;
+                    state.done += u64::from(self.bands[band].pixels) * u64::from(end - next);
+                    next = end;
+                    stop |= progress(&state).is_break();
+                }
+            }
+            if stop {
+                break;
+            }
+            // A single band has no reason to pause; several meet at multiples of PASS.
+            let end = if self.bands.len() == 1 { range.end } else { (pass.end / PASS + 1).saturating_mul(PASS) };
+            pass = pass.end..end.min(range.end);
+        }
+        Ok(self.samples().end == range.end)
+    }
+
+    /// Brings a band's sums onto the device, and those of the band that was there back to the host.
+    fn make_resident(&mut self, band: usize) -> Result<()> {
+        if self.resident == Some(band) {
+            return Ok(());
+        }
+        self.save_resident()?;
+        let film = std::mem::replace(&mut self.bands[band].film, Film::OnDevice);
+        self.recorder.begin()?;
+        for (index, slot) in [Slot::RunningSums, Slot::BatchSums].into_iter().enumerate() {
+            let Some(buffer) = self.buffer(slot) else { continue };
+            match &film {
+                Film::OnHost(data) => upload(&self.device, buffer, &data[index])?,
+                _ => self.recorder.fill(buffer, 0)?,
+            }
+        }
+        self.recorder.submit_and_wait()?;
+        self.resident = Some(band);
+        self.strata = [None; BATCHES as usize];
+        Ok(())
+    }
+
+    fn save_resident(&mut self) -> Result<()> {
+        let Some(band) = self.resident.take() else { return Ok(()) };
+        let mut data: [Vec<u8>; 2] = Default::default();
+        for (data, slot) in data.iter_mut().zip([Slot::RunningSums, Slot::BatchSums]) {
+            let Some(buffer) = self.buffer(slot) else { continue };
+            *data = download(&self.device, buffer, bands::bytes_per_pixel(slot) * u64::from(self.bands[band].pixels))?;
+        }
+        self.bands[band].film = Film::OnHost(data);
+        Ok(())
+    }
+
+    fn submit_samples(&mut self, band: usize, samples: Range<u32>) -> Result<()> {
+        self.recorder.begin()?;
+        for sample in samples.clone() {
+            self.record_sample(band, sample)?;
+        }
+        self.recorder.submit_and_wait()?;
+        self.bands[band].end = samples.end;
+        Ok(())
+    }
+
+    /// The whole pipeline, for one sample of one band.
+    fn record_sample(&mut self, band: usize, sample_index: u32) -> Result<()> {
+        let Band { first_row, pixels, .. } = self.bands[band];
+        let point = random::point(sample_index / BATCHES);
+        let mut step =
+            Step { first_row, pixel_count: pixels, sample_index, point, first: 1, count: 1, ..Step::default() };
+        let Renderer { kernels, bindings, recorder, prepared, strata, .. } = self;
+
+        let resident = &mut strata[(sample_index % BATCHES) as usize];
+        if *resident != Some(stratum(sample_index)) {
+            recorder.dispatch(&kernels.primary, bindings, pixels, &step)?;
+            *resident = Some(stratum(sample_index));
+        }
+        if prepared.has_translucent {
+            recorder.dispatch(&kernels.sample, bindings, pixels, &step)?;
+            recorder.dispatch(&kernels.reproject, bindings, pixels, &step)?;
+        }
+        // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty portion.
+        for begin in (0..prepared.ray_count.max(1)).step_by(MAX_RAYS as usize) {
+            step.ray_begin = begin;
+            step.ray_count = (prepared.ray_count - begin.min(prepared.ray_count)).min(MAX_RAYS);
+            if prepared.has_translucent {
+                recorder.dispatch(&kernels.accumulate, bindings, pixels, &step)?;
+                step.count = 0;
+            }
+            if prepared.has_reflection {
+                recorder.dispatch(&kernels.reflect, bindings, pixels, &step)?;
+                step.count = 0;
+            }
+            step.first = 0;
+        }
+        Ok(())
+    }
+
+    /// The image of the samples so far, with every channel and attribute.
+    pub fn image(&mut self) -> Result<Image> {
+        assemble::image(self)
+    }
+
+    /// The largest number of loop trips of any traversal so far; 0 unless made by [`Renderer::counting`].
+    pub fn largest_step_count(&self) -> Result<u32> {
+        let Some(counters) = self.buffer(Slot::Counters) else { return Ok(0) };
+        Ok(bytemuck::pod_read_unaligned(&download(&self.device, counters, 4)?))
+    }
+
+    fn buffer(&self, slot: Slot) -> Option<&Buffer> {
+        self.buffers.iter().find(|(s, _)| *s == slot).map(|(_, buffer)| buffer)
+    }
+}
+
+/// The buffers that only a scene and its settings determine, as bytes. A scene without lights or environment has none
+/// of theirs.
+fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u8])> {
+    [
+        (Slot::Views, bytemuck::bytes_of(&prepared.view)),
+        (Slot::Nodes, bytemuck::cast_slice(&scene.nodes)),
+        (Slot::Triangles, bytemuck::cast_slice(&scene.triangles)),
+        (Slot::Shadings, bytemuck::cast_slice(&scene.shadings)),
+        (Slot::Materials, bytemuck::cast_slice(&prepared.materials)),
+        (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
+        (Slot::Environment, bytemuck::cast_slice(&prepared.environment)),
+        (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
+    ]
+    .into_iter()
+    .filter(|(_, data)| !data.is_empty())
+    .collect()
+}
+
+/// Hex SHA-256 over the SPIR-V of all kernels.
+pub fn spirv_hash() -> String {
+    use sha2::{Digest, Sha256};
+    let mut hash = Sha256::new();
+    for (stem, spirv) in SPIRV {
+        hash.update(stem.as_bytes());
+        hash.update(spirv);
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Number of the sample's stratum within its batch, as the kernels compute it.
+fn stratum(sample_index: u32) -> u32 {
+    sample_index / BATCHES / STRATUM
+}
