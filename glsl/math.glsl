@@ -49,6 +49,13 @@ float log_(float x) {
     return y + fe * 0.693359375;
 }
 
+// log(1 + x) for x >= 0, exact to rounding for small x.
+float log1p_(float x) {
+    precise float w = 1.0 + x;
+    precise float lost = x - (w - 1.0);
+    return log_(w) + lost / w;
+}
+
 // Cosine and sine of 2 pi u, for u in [0, 1].
 vec2 cos_sin_2pi(float u) {
     float quadrant = floor(u * 4.0 + 0.5);

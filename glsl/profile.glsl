@@ -23,27 +23,21 @@ float radial_density(Material m, float r2) {
     return dot(m.density, shape(m, r2));
 }
 
-// Radius with the exact density of the chosen component: inverts 1 - (z/d) e^{-sigma (d - z)} = u for d.
+// Radius with the exact density of the chosen component. Its source is at height z; the distance d = z (1 + s) solves
+// ln(1 + s) + sigma z s = -ln(1 - u).
 float draw_radius(Material m, float u_component, float u_radius) {
-    float sigma = m.sigma_tr.x, z = m.z_real.x;
     // The first component whose cumulative probability exceeds u.
+    float sigma = m.sigma_tr.x, z = m.z_real.x;
     if (u_component >= m.component_cdf[0]) z = m.z_virtual.x;
     if (u_component >= m.component_cdf[1]) sigma = m.sigma_tr.y, z = m.z_real.y;
     if (u_component >= m.component_cdf[2]) z = m.z_virtual.y;
     if (u_component >= m.component_cdf[3]) sigma = m.sigma_tr.z, z = m.z_real.z;
     if (u_component >= m.component_cdf[4]) z = m.z_virtual.z;
-    float d = z / (1.0 - u_radius);
-    if (sigma > 0.0) {
-        // y + ln y = L for y = sigma d, by Newton's method.
-        float y_min = sigma * z;
-        float L = log_(y_min) + y_min - log_(1.0 - u_radius);
-        float e_L = exp_(min(L, 1.0));
-        float y = L > 1.0 ? L - log_(max(L, 1.0)) : e_L / (1.0 + e_L);
-        for (int i = 0; i < 5; i++) {
-            y = max(y, y_min);
-            y = y * (1.0 + L - log_(y)) / (1.0 + y);
-        }
-        d = max(y, y_min) / sigma;
-    }
-    return sqrt(max((d - z) * (d + z), 0.0));
+    float a = sigma * z;
+    float logarithm = -log_(1.0 - u_radius);
+    // Both terms alone bound s from above; from there four steps of Newton's method reach rounding.
+    float s = u_radius / (1.0 - u_radius);
+    if (a > 0.0) s = min(s, logarithm / a);
+    for (int i = 0; i < 4; i++) s -= (log1p_(s) + a * s - logarithm) / (1.0 / (1.0 + s) + a);
+    return z * sqrt(max(s * (s + 2.0), 0.0));
 }

@@ -253,15 +253,15 @@ impl Renderer {
     /// The whole pipeline, for one sample of one band.
     fn record_sample(&mut self, band: usize, sample_index: u32) -> Result<()> {
         let Band { first_row, pixels, .. } = self.bands[band];
-        let point = random::point(sample_index / BATCHES);
+        let point = random::point(sample_index);
         let mut step =
             Step { first_row, pixel_count: pixels, sample_index, point, first: 1, count: 1, ..Step::default() };
         let Renderer { kernels, bindings, recorder, prepared, strata, .. } = self;
 
         let resident = &mut strata[(sample_index % BATCHES) as usize];
-        if *resident != Some(stratum(sample_index)) {
+        if *resident != Some(random::stratum(sample_index)) {
             recorder.dispatch(&kernels.primary, bindings, pixels, &step)?;
-            *resident = Some(stratum(sample_index));
+            *resident = Some(random::stratum(sample_index));
         }
         if prepared.has_translucent {
             recorder.dispatch(&kernels.sample, bindings, pixels, &step)?;
@@ -327,9 +327,4 @@ pub fn spirv_hash() -> String {
         hash.update(spirv);
     }
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Number of the sample's stratum within its batch, as the kernels compute it.
-fn stratum(sample_index: u32) -> u32 {
-    sample_index / BATCHES / STRATUM
 }
