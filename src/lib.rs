@@ -1,10 +1,12 @@
 //! translucent renders translucent matter in glTF scenes with raw Vulkan compute.
 
 pub mod error;
+pub mod gpu;
 pub mod reference;
 pub mod scene;
 pub mod settings;
 pub mod shared;
 
 pub use error::{Error, Result};
+pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use settings::{CameraChoice, Normalisation, Projection, Settings};

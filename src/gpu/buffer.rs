@@ -1,0 +1,244 @@
+//! A buffer that owns its memory, and the way of bytes to the device and back.
+
+use super::{
+    During, Recorder,
+    device::{Device, Handles, lock},
+};
+use crate::{Error, Result};
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::{MemoryLocation, vulkan as memory};
+use std::{ptr::NonNull, sync::Arc};
+
+/// Bytes of a staging buffer; larger transfers go in pieces.
+const STAGING_BYTES: u64 = 8 << 20;
+
+/// Where a buffer's memory is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Location {
+    /// On the device; filled by [`upload`], read by [`download`].
+    Device,
+    /// On the host, for [`Buffer::write`].
+    Upload,
+    /// On the host, for [`Buffer::read`].
+    Readback,
+}
+
+/// A storage buffer, freed when it and all bindings and recordings that use it are dropped.
+pub struct Buffer {
+    pub(super) memory: Arc<BufferMemory>,
+}
+
+/// What bindings and recordings keep alive of a buffer. Only the one [`Buffer`] reads and writes through `mapped`.
+pub(super) struct BufferMemory {
+    pub raw: vk::Buffer,
+    pub bytes: u64,
+    handles: Arc<Handles>,
+    // None only while making and dropping.
+    allocation: Option<memory::Allocation>,
+    mapped: Option<NonNull<u8>>,
+}
+
+// SAFETY: `mapped` points into memory that this value owns; `Buffer` reads it through & and writes through &mut.
+unsafe impl Send for BufferMemory {}
+// SAFETY: as above.
+unsafe impl Sync for BufferMemory {}
+
+impl Buffer {
+    /// A buffer of `bytes` (at least 4), for kernels and copies. Its content is undefined.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] beyond [`Device::max_storage_buffer_range`] or if the memory cannot be had;
+    /// [`Error::Vulkan`] if the buffer cannot be made.
+    pub fn new(device: &Device, name: &str, bytes: u64, location: Location) -> Result<Buffer> {
+        let limit = device.max_storage_buffer_range();
+        if bytes > limit {
+            let problem = format!("{bytes} bytes; the device's buffers hold at most {limit}");
+            return Err(Error::Memory { step: format!("create buffer `{name}`"), problem });
+        }
+        Buffer::with_handles(&device.handles, name, bytes, location)
+    }
+
+    pub(super) fn with_handles(handles: &Arc<Handles>, name: &str, bytes: u64, location: Location) -> Result<Buffer> {
+        let step = format!("create buffer `{name}`");
+        let problem =
+            |error: gpu_allocator::AllocationError| Error::Memory { step: step.clone(), problem: error.to_string() };
+        let bytes = bytes.max(4);
+        let device = &handles.device;
+        // SAFETY: the device is alive and the size is within its limits.
+        let raw = unsafe { device.create_buffer(&create_info(bytes), None) }.during(&step)?;
+        handles.name(raw, name);
+        // From here on dropping it destroys the buffer.
+        let mut owner = BufferMemory { raw, bytes, handles: handles.clone(), allocation: None, mapped: None };
+        // SAFETY: the buffer is of this device.
+        let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
+        let description = memory::AllocationCreateDesc {
+            name,
+            requirements,
+            location: match location {
+                Location::Device => MemoryLocation::GpuOnly,
+                Location::Upload => MemoryLocation::CpuToGpu,
+                Location::Readback => MemoryLocation::GpuToCpu,
+            },
+            linear: true,
+            allocation_scheme: memory::AllocationScheme::GpuAllocatorManaged,
+        };
+        let allocation = handles.with_allocator(|allocator| allocator.allocate(&description)).map_err(problem)?;
+        // SAFETY: the allocation is alive and owned by the same value as the buffer; its offset is within it.
+        let bound = unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) };
+        let flags = allocation.memory_properties();
+        // The device's memory is touched directly only where the host caches it: over a bus, reads would crawl.
+        let direct = match location {
+            Location::Device => {
+                flags.contains(vk::MemoryPropertyFlags::HOST_COHERENT | vk::MemoryPropertyFlags::HOST_CACHED)
+                    && !handles.force_staging
+            }
+            Location::Upload | Location::Readback => true,
+        };
+        owner.mapped = allocation.mapped_ptr().filter(|_| direct).map(NonNull::cast);
+        owner.allocation = Some(allocation);
+        bound.during(step)?;
+        Ok(Buffer { memory: Arc::new(owner) })
+    }
+
+    /// Size in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.memory.bytes
+    }
+
+    /// Copies `data` to the start of the buffer. No submitted recording may be using it.
+    ///
+    /// # Panics
+    /// If the host cannot reach the buffer's memory, or `data` does not fit.
+    pub fn write<T: Pod>(&mut self, data: &[T]) {
+        self.write_at(0, bytemuck::cast_slice(data));
+    }
+
+    /// The content, as many whole `T` as it holds.
+    ///
+    /// # Panics
+    /// If the host cannot reach the buffer's memory.
+    pub fn read<T: Pod>(&self) -> Vec<T> {
+        let mut data = vec![T::zeroed(); self.bytes() as usize / size_of::<T>()];
+        self.read_at(0, bytemuck::cast_slice_mut(&mut data));
+        data
+    }
+
+    fn write_at(&mut self, offset: u64, data: &[u8]) {
+        let start = self.mapped(offset, data.len());
+        // SAFETY: `mapped` checked the range; &mut and the caller's care keep others out.
+        unsafe { start.copy_from_nonoverlapping(NonNull::from(data).cast(), data.len()) };
+    }
+
+    fn read_at(&self, offset: u64, data: &mut [u8]) {
+        let start = self.mapped(offset, data.len());
+        // SAFETY: `mapped` checked the range; writers need &mut.
+        unsafe { start.copy_to_nonoverlapping(NonNull::from(&mut *data).cast(), data.len()) };
+    }
+
+    /// Address of `len` bytes at `offset`.
+    fn mapped(&self, offset: u64, len: usize) -> NonNull<u8> {
+        assert!(offset + len as u64 <= self.bytes(), "{len} bytes at {offset} of a buffer of {}", self.bytes());
+        let start = self.memory.mapped.expect("the buffer is on the host");
+        // SAFETY: the offset is within the mapped range.
+        unsafe { start.add(offset as usize) }
+    }
+}
+
+impl BufferMemory {
+    /// Whether it was made on this device.
+    pub fn is_of(&self, handles: &Arc<Handles>) -> bool {
+        Arc::ptr_eq(&self.handles, handles)
+    }
+}
+
+impl Drop for BufferMemory {
+    fn drop(&mut self) {
+        // SAFETY: no bindings or recordings hold it any more, and it is of this device.
+        unsafe { self.handles.device.destroy_buffer(self.raw, None) };
+        if let Some(allocation) = self.allocation.take() {
+            let freed = self.handles.with_allocator(|allocator| allocator.free(allocation));
+            debug_assert!(freed.is_ok(), "an allocation is freed once");
+        }
+    }
+}
+
+/// How every buffer is made: usable in every way that kernels and copies need.
+pub(super) fn create_info(bytes: u64) -> vk::BufferCreateInfo<'static> {
+    vk::BufferCreateInfo::default().size(bytes).usage(
+        vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
+    )
+}
+
+/// Host buffers and a recorder for transfers, kept by the device from the first use on.
+pub(super) struct Staging {
+    recorder: Recorder,
+    upload: Buffer,
+    readback: Buffer,
+}
+
+impl Staging {
+    fn new(handles: &Arc<Handles>) -> Result<Staging> {
+        Ok(Staging {
+            recorder: Recorder::with_handles(handles, false)?,
+            upload: Buffer::with_handles(handles, "staging (upload)", STAGING_BYTES, Location::Upload)?,
+            readback: Buffer::with_handles(handles, "staging (readback)", STAGING_BYTES, Location::Readback)?,
+        })
+    }
+}
+
+/// Calls `transfer` with the device's staging buffers, made on the first use.
+fn with_staging(device: &Device, transfer: impl FnOnce(&mut Staging) -> Result<()>) -> Result<()> {
+    let mut guard = lock(&device.staging);
+    if guard.is_none() {
+        *guard = Some(Staging::new(&device.handles)?);
+    }
+    transfer(guard.as_mut().expect("made just above"))
+}
+
+/// Copies `data` to the start of `buffer`, wherever it is, and waits. No submitted recording may be using it.
+///
+/// # Errors
+/// [`Error::Vulkan`] or [`Error::Memory`] if the staged copy fails.
+///
+/// # Panics
+/// If `data` does not fit.
+pub fn upload(device: &Device, buffer: &mut Buffer, data: &[u8]) -> Result<()> {
+    if buffer.memory.mapped.is_some() {
+        buffer.write(data);
+        return Ok(());
+    }
+    assert!(data.len() as u64 <= buffer.bytes(), "{} bytes into a buffer of {}", data.len(), buffer.bytes());
+    with_staging(device, |staging| {
+        for (i, piece) in data.chunks(STAGING_BYTES as usize).enumerate() {
+            staging.upload.write(piece);
+            staging.recorder.begin()?;
+            let offset = i as u64 * STAGING_BYTES;
+            staging.recorder.copy_at(&staging.upload, 0, buffer, offset, piece.len() as u64);
+            staging.recorder.submit_and_wait()?;
+        }
+        Ok(())
+    })
+}
+
+/// The content of `buffer`, wherever it is, as many whole `T` as it holds.
+///
+/// # Errors
+/// [`Error::Vulkan`] or [`Error::Memory`] if the staged copy fails.
+pub fn download<T: Pod>(device: &Device, buffer: &Buffer) -> Result<Vec<T>> {
+    if buffer.memory.mapped.is_some() {
+        return Ok(buffer.read());
+    }
+    let mut data = vec![T::zeroed(); buffer.bytes() as usize / size_of::<T>()];
+    with_staging(device, |staging| {
+        for (i, piece) in bytemuck::cast_slice_mut(&mut data).chunks_mut(STAGING_BYTES as usize).enumerate() {
+            staging.recorder.begin()?;
+            let offset = i as u64 * STAGING_BYTES;
+            staging.recorder.copy_at(buffer, offset, &staging.readback, 0, piece.len() as u64);
+            staging.recorder.submit_and_wait()?;
+            staging.readback.read_at(0, piece);
+        }
+        Ok(())
+    })?;
+    Ok(data)
+}

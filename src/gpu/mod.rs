@@ -1,0 +1,37 @@
+//! The thin layer over Vulkan 1.3 compute: device, buffers, kernels, recordings. It knows slots and features, not
+//! scenes, and it is the only place with `unsafe`.
+//!
+//! Everything here keeps what it uses alive, so any order of dropping is right. Nothing is global: a process may
+//! open several devices.
+
+mod buffer;
+mod device;
+mod instance;
+mod kernel;
+mod recorder;
+
+pub use buffer::{Buffer, Location, download, upload};
+pub use device::{Device, DeviceOptions};
+pub use instance::{DeviceInfo, DeviceKind, ValidationLog};
+pub use kernel::{Bindings, Kernel, Layout};
+pub use recorder::Recorder;
+
+use crate::{Error, Result};
+use ash::vk;
+use std::ffi::CString;
+
+/// Names the step in the error of a Vulkan call.
+trait During<T> {
+    fn during(self, step: impl Into<String>) -> Result<T>;
+}
+
+impl<T> During<T> for std::result::Result<T, vk::Result> {
+    fn during(self, step: impl Into<String>) -> Result<T> {
+        self.map_err(|result| Error::Vulkan { step: step.into(), result })
+    }
+}
+
+/// A name for debuggers. A NUL inside would end it early, so such a name is dropped.
+fn c_name(name: &str) -> CString {
+    CString::new(name).unwrap_or_default()
+}
