@@ -3,6 +3,11 @@
 //! A twin takes what one invocation of its kernel reads and returns what it writes, in the shared structs; inside it
 //! computes in f64.
 
+pub mod boundary;
+pub mod math;
+pub mod profile;
+pub mod random;
+
 use crate::shared::{Features, Light, Material, Shading, Triangle, View};
 use glam::Vec3;
 
