@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::{MemoryLocation, vulkan as memory};
-use std::{ptr::NonNull, sync::Arc};
+use std::{cell::Cell, marker::PhantomData, ptr::NonNull, sync::Arc};
 
 /// Bytes of a staging buffer; larger transfers go in pieces.
 const STAGING_BYTES: u64 = 8 << 20;
@@ -25,8 +25,11 @@ pub enum Location {
 }
 
 /// A storage buffer, freed when it and all bindings and recordings that use it are dropped.
+///
+/// It may move to another thread but not be shared between threads, so its content is touched by one at a time.
 pub struct Buffer {
     pub(super) memory: Arc<BufferMemory>,
+    one_thread: PhantomData<Cell<()>>,
 }
 
 /// What bindings and recordings keep alive of a buffer. Only the one [`Buffer`] reads and writes through `mapped`.
@@ -39,7 +42,7 @@ pub(super) struct BufferMemory {
     mapped: Option<NonNull<u8>>,
 }
 
-// SAFETY: `mapped` points into memory that this value owns; `Buffer` reads it through & and writes through &mut.
+// SAFETY: `mapped` points into memory that this value owns; only the one `Buffer` follows it, which is not `Sync`.
 unsafe impl Send for BufferMemory {}
 // SAFETY: as above.
 unsafe impl Sync for BufferMemory {}
@@ -98,7 +101,7 @@ impl Buffer {
         owner.mapped = allocation.mapped_ptr().filter(|_| direct).map(NonNull::cast);
         owner.allocation = Some(allocation);
         bound.during(step)?;
-        Ok(Buffer { memory: Arc::new(owner) })
+        Ok(Buffer { memory: Arc::new(owner), one_thread: PhantomData })
     }
 
     /// Size in bytes.
@@ -110,7 +113,7 @@ impl Buffer {
     ///
     /// # Panics
     /// If the host cannot reach the buffer's memory, or `data` does not fit.
-    pub fn write<T: Pod>(&mut self, data: &[T]) {
+    pub fn write<T: Pod>(&self, data: &[T]) {
         self.write_at(0, bytemuck::cast_slice(data));
     }
 
@@ -124,15 +127,15 @@ impl Buffer {
         data
     }
 
-    fn write_at(&mut self, offset: u64, data: &[u8]) {
+    fn write_at(&self, offset: u64, data: &[u8]) {
         let start = self.mapped(offset, data.len());
-        // SAFETY: `mapped` checked the range; &mut and the caller's care keep others out.
+        // SAFETY: `mapped` checked the range; no reference points into it and no other thread is here.
         unsafe { start.copy_from_nonoverlapping(NonNull::from(data).cast(), data.len()) };
     }
 
     fn read_at(&self, offset: u64, data: &mut [u8]) {
         let start = self.mapped(offset, data.len());
-        // SAFETY: `mapped` checked the range; writers need &mut.
+        // SAFETY: as above.
         unsafe { start.copy_to_nonoverlapping(NonNull::from(&mut *data).cast(), data.len()) };
     }
 
@@ -203,7 +206,7 @@ fn with_staging(device: &Device, transfer: impl FnOnce(&mut Staging) -> Result<(
 ///
 /// # Panics
 /// If `data` does not fit.
-pub fn upload(device: &Device, buffer: &mut Buffer, data: &[u8]) -> Result<()> {
+pub fn upload(device: &Device, buffer: &Buffer, data: &[u8]) -> Result<()> {
     if buffer.memory.mapped.is_some() {
         buffer.write(data);
         return Ok(());
@@ -221,17 +224,21 @@ pub fn upload(device: &Device, buffer: &mut Buffer, data: &[u8]) -> Result<()> {
     })
 }
 
-/// The content of `buffer`, wherever it is, as many whole `T` as it holds.
+/// The first `bytes` of `buffer`, wherever it is.
 ///
 /// # Errors
 /// [`Error::Vulkan`] or [`Error::Memory`] if the staged copy fails.
-pub fn download<T: Pod>(device: &Device, buffer: &Buffer) -> Result<Vec<T>> {
+///
+/// # Panics
+/// If the buffer is shorter.
+pub fn download(device: &Device, buffer: &Buffer, bytes: u64) -> Result<Vec<u8>> {
+    let mut data = vec![0; bytes as usize];
     if buffer.memory.mapped.is_some() {
-        return Ok(buffer.read());
+        buffer.read_at(0, &mut data);
+        return Ok(data);
     }
-    let mut data = vec![T::zeroed(); buffer.bytes() as usize / size_of::<T>()];
     with_staging(device, |staging| {
-        for (i, piece) in bytemuck::cast_slice_mut(&mut data).chunks_mut(STAGING_BYTES as usize).enumerate() {
+        for (i, piece) in data.chunks_mut(STAGING_BYTES as usize).enumerate() {
             staging.recorder.begin()?;
             let offset = i as u64 * STAGING_BYTES;
             staging.recorder.copy_at(buffer, offset, &staging.readback, 0, piece.len() as u64);

@@ -23,7 +23,7 @@ pub(super) struct LayoutObjects {
     pub pipeline: vk::PipelineLayout,
     set: vk::DescriptorSetLayout,
     // Stands in the slots that a scene does not need; no kernel may mention those.
-    absent: Option<Buffer>,
+    absent: Option<Arc<BufferMemory>>,
     handles: Arc<Handles>,
 }
 
@@ -62,7 +62,7 @@ impl Layout {
         // SAFETY: as above.
         objects.pipeline =
             unsafe { handles.device.create_pipeline_layout(&create, None) }.during("create the pipeline layout")?;
-        objects.absent = Some(Buffer::with_handles(handles, "absent", 4, Location::Device)?);
+        objects.absent = Some(Buffer::with_handles(handles, "absent", 4, Location::Device)?.memory);
         Ok(Layout { objects: Arc::new(objects) })
     }
 }
@@ -104,7 +104,7 @@ impl Bindings {
             .iter()
             .map(|&slot| {
                 let found = buffers.iter().find(|(named, _)| *named == slot);
-                found.map_or(absent, |(_, buffer)| *buffer).memory.clone()
+                found.map_or(absent, |(_, buffer)| &buffer.memory).clone()
             })
             .collect();
         assert!(kept.iter().all(|buffer| buffer.is_of(handles)), "buffers and layout are of one device");
