@@ -2,11 +2,15 @@
 
 pub mod error;
 pub mod gpu;
+pub mod image;
+pub mod prepare;
 pub mod reference;
+pub mod render;
 pub mod scene;
 pub mod settings;
 pub mod shared;
 
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
+pub use render::{Progress, Renderer};
 pub use settings::{CameraChoice, Normalisation, Projection, Settings};
