@@ -12,5 +12,7 @@ pub mod shared;
 
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
+pub use image::Image;
 pub use render::{Progress, Renderer};
+pub use scene::{Environment, LoadOptions, Scene};
 pub use settings::{CameraChoice, Normalisation, Projection, Settings};
