@@ -2,6 +2,7 @@
 
 pub mod error;
 pub mod gpu;
+pub mod image;
 pub mod reference;
 pub mod scene;
 pub mod settings;
@@ -9,4 +10,5 @@ pub mod shared;
 
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
+pub use image::Image;
 pub use settings::{CameraChoice, Normalisation, Projection, Settings};
