@@ -2,6 +2,8 @@
 
 // Unpolarised reflectance of a smooth dielectric, seen from outside; ior = inside / outside.
 float fresnel(float ior, float cos_outside) {
+    // At grazing incidence the quotient is 0/0 without a boundary.
+    if (ior == 1.0) return 0.0;
     float c = clamp(cos_outside, 0.0, 1.0);
     float g2 = ior * ior - 1.0 + c * c;
     if (g2 <= 0.0) return 1.0;

@@ -3,7 +3,9 @@
 pub mod error;
 pub mod gpu;
 pub mod image;
+pub mod prepare;
 pub mod reference;
+pub mod render;
 pub mod scene;
 pub mod settings;
 pub mod shared;
@@ -11,4 +13,6 @@ pub mod shared;
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use image::Image;
+pub use render::{Progress, Renderer};
+pub use scene::{LoadOptions, Scene};
 pub use settings::{CameraChoice, Normalisation, Projection, Settings};

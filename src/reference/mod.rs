@@ -1,15 +1,29 @@
 //! The kernels in f64, written from the formulas: twins of `glsl/*.comp` and `glsl/*.glsl` under the same stems.
 //!
 //! A twin takes what one invocation of its kernel reads and returns what it writes, in the shared structs; inside it
-//! computes in f64.
+//! computes in f64. [`render`] runs them in order. [`area`] is an integrator of its own that shares nothing with them.
 
+pub mod accumulate;
+pub mod area;
 pub mod boundary;
+pub mod intersect;
+pub mod light;
 pub mod math;
+pub mod primary;
 pub mod profile;
+pub mod projection;
 pub mod random;
+pub mod reflect;
+pub mod reproject;
+pub mod resolve;
+pub mod sample;
 
-use crate::shared::{Features, Light, Material, Shading, Triangle, View};
+use crate::shared::{
+    BATCHES, ENVIRONMENT_NONE, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Triangle, View,
+};
 use glam::Vec3;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// What every kernel may read: the buffers that do not change from sample to sample.
 #[derive(Clone, Copy, Debug)]
@@ -25,4 +39,63 @@ pub struct Inputs<'a> {
     pub environment: &'a [Vec3],
     /// Its sampling table; see [`Slot::EnvironmentCdf`](crate::shared::Slot::EnvironmentCdf).
     pub environment_cdf: &'a [f32],
+}
+
+impl Inputs<'_> {
+    /// Shadow rays of a sample: one for each delta light, N for the environment.
+    pub fn rays(&self) -> u32 {
+        let directions = if self.features.environment == ENVIRONMENT_NONE { 0 } else { self.view.directions };
+        self.view.light_count + directions
+    }
+}
+
+/// Column and row, in the full image, of pixel `index` of the step's band.
+pub fn pixel(view: &View, step: &Step, index: u32) -> (u32, u32) {
+    (view.crop_x + index % view.crop_width, step.first_row + index / view.crop_width)
+}
+
+/// The step of one sample that traces all its rays in one dispatch.
+pub fn step(inputs: &Inputs, sample_index: u32, rows: Range<u32>, samples: Range<u32>) -> Step {
+    Step {
+        first_row: rows.start,
+        pixel_count: rows.len() as u32 * inputs.view.crop_width,
+        sample_index,
+        ray_count: inputs.rays(),
+        first: 1,
+        range_begin: samples.start,
+        range_end: samples.end,
+        point: random::point(sample_index),
+        ..Default::default()
+    }
+}
+
+/// The rows `rows` of the image with the samples `samples`, by the twins in the order of the kernels.
+pub fn render(inputs: &Inputs, rows: Range<u32>, samples: Range<u32>) -> Vec<Pixel> {
+    let pixels = rows.len() as u32 * inputs.view.crop_width;
+    (0..pixels).into_par_iter().map(|index| render_pixel(inputs, index, rows.clone(), samples.clone())).collect()
+}
+
+fn render_pixel(inputs: &Inputs, index: u32, rows: Range<u32>, samples: Range<u32>) -> Pixel {
+    let mut sums = Sums::default();
+    let mut batch_sums = [Vec3::ZERO; BATCHES as usize];
+    // The first surface of each batch, and its stratum.
+    let mut first: [Option<(u32, Surface)>; BATCHES as usize] = [None; BATCHES as usize];
+    for sample_index in samples.clone() {
+        let step = step(inputs, sample_index, rows.clone(), samples.clone());
+        let batch = random::batch(sample_index) as usize;
+        let stratum = random::stratum(sample_index);
+        let surface = match first[batch] {
+            Some((known, surface)) if known == stratum => surface,
+            _ => primary::primary(inputs, &step, index),
+        };
+        first[batch] = Some((stratum, surface));
+        let probe = sample::sample(inputs, &step, index, &surface);
+        let hits = reproject::reproject(inputs, &step, index, &surface, &probe);
+        let subsurface = accumulate::accumulate(inputs, &step, index, &surface, &probe, &hits);
+        subsurface.add_subsurface(&step, &surface, &mut sums, &mut batch_sums[batch]);
+        let reflection = reflect::reflect(inputs, &step, index, &surface);
+        reflect::add_reflection(&reflection, &mut sums);
+    }
+    let step = step(inputs, samples.start, rows, samples);
+    resolve::resolve(&inputs.features, &step, &sums, &batch_sums)
 }

@@ -37,8 +37,8 @@ pub fn image(renderer: &mut Renderer) -> Result<Image> {
         renderer.strata[0] = None;
         let Renderer { recorder, kernels, bindings, .. } = renderer;
         recorder.begin()?;
-        recorder.dispatch(&kernels.resolve, bindings, pixels, &step)?;
-        recorder.dispatch(&kernels.primary, bindings, pixels, &step)?;
+        recorder.dispatch(&kernels.resolve, bindings, pixels, &step);
+        recorder.dispatch(&kernels.primary, bindings, pixels, &step);
         recorder.submit_and_wait()?;
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels)?;

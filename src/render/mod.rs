@@ -22,6 +22,9 @@ const PASS: u32 = BATCHES * STRATUM;
 /// Pixel samples of one submission: about a second of software Vulkan, milliseconds of a GPU.
 const SUBMISSION: u64 = 1 << 20;
 
+/// What a band takes along when it leaves the device.
+const SUMS: [Slot; 2] = [Slot::RunningSums, Slot::BatchSums];
+
 macro_rules! kernels {
     ($($stem:ident),*) => {
         /// The compute pipelines that a scene needs, specialised to its features.
@@ -216,11 +219,11 @@ impl Renderer {
         self.save_resident()?;
         let film = std::mem::replace(&mut self.bands[band].film, Film::OnDevice);
         self.recorder.begin()?;
-        for (index, slot) in [Slot::RunningSums, Slot::BatchSums].into_iter().enumerate() {
-            let Some(buffer) = self.buffer(slot) else { continue };
+        for (index, slot) in SUMS.into_iter().enumerate() {
+            let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
             match &film {
                 Film::OnHost(data) => upload(&self.device, buffer, &data[index])?,
-                _ => self.recorder.fill(buffer, 0)?,
+                _ => self.recorder.fill(buffer, 0),
             }
         }
         self.recorder.submit_and_wait()?;
@@ -232,7 +235,7 @@ impl Renderer {
     fn save_resident(&mut self) -> Result<()> {
         let Some(band) = self.resident.take() else { return Ok(()) };
         let mut data: [Vec<u8>; 2] = Default::default();
-        for (data, slot) in data.iter_mut().zip([Slot::RunningSums, Slot::BatchSums]) {
+        for (data, slot) in data.iter_mut().zip(SUMS) {
             let Some(buffer) = self.buffer(slot) else { continue };
             *data = download(&self.device, buffer, bands::bytes_per_pixel(slot) * u64::from(self.bands[band].pixels))?;
         }
@@ -260,23 +263,23 @@ impl Renderer {
 
         let resident = &mut strata[(sample_index % BATCHES) as usize];
         if *resident != Some(random::stratum(sample_index)) {
-            recorder.dispatch(&kernels.primary, bindings, pixels, &step)?;
+            recorder.dispatch(&kernels.primary, bindings, pixels, &step);
             *resident = Some(random::stratum(sample_index));
         }
         if prepared.has_translucent {
-            recorder.dispatch(&kernels.sample, bindings, pixels, &step)?;
-            recorder.dispatch(&kernels.reproject, bindings, pixels, &step)?;
+            recorder.dispatch(&kernels.sample, bindings, pixels, &step);
+            recorder.dispatch(&kernels.reproject, bindings, pixels, &step);
         }
         // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty portion.
         for begin in (0..prepared.ray_count.max(1)).step_by(MAX_RAYS as usize) {
             step.ray_begin = begin;
             step.ray_count = (prepared.ray_count - begin.min(prepared.ray_count)).min(MAX_RAYS);
             if prepared.has_translucent {
-                recorder.dispatch(&kernels.accumulate, bindings, pixels, &step)?;
+                recorder.dispatch(&kernels.accumulate, bindings, pixels, &step);
                 step.count = 0;
             }
             if prepared.has_reflection {
-                recorder.dispatch(&kernels.reflect, bindings, pixels, &step)?;
+                recorder.dispatch(&kernels.reflect, bindings, pixels, &step);
                 step.count = 0;
             }
             step.first = 0;

@@ -1,8 +1,26 @@
 //! A checked, immutable scene: plain data in f64 metres, and geometry in f32 internal units. No Vulkan.
 
-use crate::shared;
+mod accessor;
+mod bvh;
+mod camera;
+mod environment;
+mod frame;
+mod gltf;
+mod hash;
+mod json;
+mod material;
+mod medium;
+mod mesh;
+mod presets;
+mod unit;
+
+pub use bvh::MAX_DEPTH;
+pub use presets::{Preset, preset, presets};
+pub use unit::parse_unit;
+
+use crate::{Error, Result, shared};
 use glam::DVec3;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A scene that passed every check of [`Scene::load`].
 #[derive(Clone, Debug)]
@@ -25,8 +43,95 @@ pub struct Scene {
     pub environment: Environment,
     /// What the file asks for and we do not model, one sentence each.
     pub warnings: Vec<String>,
+    /// Triangles of zero area, which were left out.
+    pub dropped_triangles: u64,
     /// Hex SHA-256 of everything that determines the image.
     pub hash: String,
+}
+
+/// How a file is to be read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadOptions {
+    /// Metres of one unit of the file's geometry, cameras and lights. Coefficients, attenuation distances, candela and
+    /// lux do not depend on it.
+    pub unit: f64,
+    /// (name of a material, name of a preset that replaces its medium and index of refraction); the last one counts.
+    pub materials: Vec<(String, String)>,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        LoadOptions { unit: 1.0, materials: Vec::new() }
+    }
+}
+
+impl Scene {
+    /// Reads a .gltf or .glb file with the default options.
+    ///
+    /// # Errors
+    /// As [`Scene::load_with`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Scene> {
+        Scene::load_with(path, &LoadOptions::default())
+    }
+
+    /// Reads a .gltf or .glb file.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it cannot be read; [`Error::Scene`] with file, item and problem for every rule that its
+    /// contents break; [`Error::Setting`] for options that do not fit it. No input makes it panic.
+    pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Scene> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|error| Error::file(path, error))?;
+        Scene::from_bytes(path, &bytes, options)
+    }
+
+    /// Reads the contents of a .gltf or .glb file; buffers that they name are looked for beside `file`.
+    ///
+    /// # Errors
+    /// As [`Scene::load_with`].
+    pub fn from_bytes(file: impl AsRef<Path>, bytes: &[u8], options: &LoadOptions) -> Result<Scene> {
+        let file = file.as_ref();
+        if !(1e-9..=1e9).contains(&options.unit) {
+            return Err(Error::setting("unit", format!("must be from 1e-9 to 1e9 metres, is {}", options.unit)));
+        }
+        let gltf::Raw { triangles, dropped, materials, sets, lights, cameras, mut warnings } =
+            gltf::read(file, bytes, options)?;
+        let frame = frame::around(file, &triangles, &materials)?;
+        let (triangles, shadings, too_small) = frame::internal(file, &frame, &triangles)?;
+        if too_small > 0 {
+            warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
+        }
+        let (nodes, order) = bvh::build(file, &triangles)?;
+        let mut scene = Scene {
+            file: file.to_path_buf(),
+            frame,
+            triangles: order.iter().map(|&index| triangles[index as usize]).collect(),
+            shadings: order.iter().map(|&index| shadings[index as usize]).collect(),
+            nodes,
+            materials,
+            sets,
+            lights,
+            cameras,
+            environment: Environment::default(),
+            warnings,
+            dropped_triangles: dropped + too_small,
+            hash: String::new(),
+        };
+        scene.hash = hash::hash(&scene);
+        Ok(scene)
+    }
+
+    /// Replaces the light from infinitely far away, and brings [`Scene::hash`] up to date.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for radiance that is negative or not finite, an image whose size does not fit its texels,
+    /// a rotation that is not finite, a scale that is negative or not finite.
+    pub fn set_environment(&mut self, environment: Environment) -> Result<()> {
+        environment.check()?;
+        self.environment = environment;
+        self.hash = hash::hash(self);
+        Ok(())
+    }
 }
 
 /// Internal position = (metres - centre) * scale. Chosen so that the translucent geometry (all geometry if there is
@@ -133,13 +238,19 @@ pub enum Lens {
 }
 
 /// Light from infinitely far away.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     pub map: EnvironmentMap,
     /// Rotation about +Y [degrees], counter-clockwise seen from above.
     pub rotation: f64,
     /// Factor on the radiance.
     pub scale: f64,
+}
+
+impl Default for Environment {
+    fn default() -> Self {
+        Environment { map: EnvironmentMap::None, rotation: 0.0, scale: 1.0 }
+    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]

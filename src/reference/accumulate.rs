@@ -1,0 +1,245 @@
+//! Light x BSSRDF x Jacobian / density, into running sums: twin of `accumulate.comp`.
+//!
+//! # Estimator
+//! Lo(xo, wo) = int_A int_Omega S Li cos dw dA is estimated by the sum over a probe's hits x_j of
+//!
+//!   Ft(wo) f(|x_j - xo|) / p(x_j) E(x_j),   f = Rd / (pi (1 - rho_e)),   E = int Ft(wi) Li cos dw,
+//!
+//! with p of [`projection`](super::projection). Every hit's weight is known without its light, so only one hit is lit:
+//! drawn with probability w_j / W, w_j = (sum of f over channels) / p_j, and multiplied by W / w_j (resampled importance
+//! sampling: J. Talbot, D. Cline, P. Egbert, EGSR 2005). The geometric normal is in p, which is a density of area; the
+//! interpolated one is in Ft and the cosines. Light from below either horizon counts nothing.
+//!
+//! # The method as given
+//! Polar coordinates of the tangent plane, p_T = s e^(-s r) / (2 pi r) with one rate s for all channels, wi and camera
+//! ray as above:
+//!
+//!   Lo ~ 1 / N * sum of Ft(wo) f E (2 pi r / s) e^(s r) J,   J = |no.d| / |n.d| / q^2.
+//!
+//! The exponentials of density and profile are one, so that neither overflows.
+//!
+//! # Sums
+//! Compensated: D. E. Knuth's TwoSum finds the rounding error of each addition exactly and a second number carries it
+//! (A. Neumaier, ZAMM 54 (1974)).
+
+use super::boundary::transmittance;
+use super::light::{self, FAR};
+use super::math::cosine_direction;
+use super::projection::{
+    Seen, geometric_normal, interpolated_normal, inverse_scale, material, mixture_density, seen, shapes,
+};
+use super::random::{batch, key, scramble, sobol, unit};
+use super::sample::coordinate;
+use super::{Inputs, intersect, pixel};
+use crate::shared::{
+    BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, MISS, Material, PROJECTION_CAMERA, Probe,
+    SHADOW_OFFSET, Step, Sums, Surface,
+};
+use glam::{DVec2, DVec3, Vec3};
+use std::f64::consts::{PI, TAU};
+
+/// What one dispatch adds to a pixel's sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contribution {
+    /// Zero if invalid.
+    pub radiance: DVec3,
+    /// Whether it was not finite and non-negative.
+    pub invalid: bool,
+}
+
+impl Contribution {
+    pub(super) fn of(radiance: DVec3) -> Contribution {
+        // As the kernel's sum sees it: what overflows f32 is not finite.
+        let valid = radiance.as_vec3().is_finite() && radiance.cmpge(DVec3::ZERO).all();
+        Contribution { radiance: if valid { radiance } else { DVec3::ZERO }, invalid: !valid }
+    }
+
+    /// Adds to the sums of a pixel as `accumulate.comp` does. `batch_sum` is the one of the sample's batch.
+    pub fn add_subsurface(&self, step: &Step, surface: &Surface, sums: &mut Sums, batch_sum: &mut Vec3) {
+        let radiance = self.radiance.as_vec3();
+        add(&mut sums.subsurface, &mut sums.subsurface_carry, radiance);
+        *batch_sum += radiance;
+        sums.invalid += u32::from(self.invalid);
+        if step.first != 0 {
+            sums.samples += 1;
+            sums.covered += u32::from(surface.triangle != MISS);
+        }
+    }
+}
+
+/// Compensated addition in f32: `sum + carry` grows by `x` up to a rounding of the carry.
+pub fn add(sum: &mut Vec3, carry: &mut Vec3, x: Vec3) {
+    let next = *sum + x;
+    let added = next - *sum;
+    *carry += (*sum - (next - added)) + (x - added);
+    *sum = next;
+}
+
+/// Environment coordinates of direction `j` of the step's sample.
+pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, dimension: u32) -> (f64, f64) {
+    let (px, py) = pixel(inputs.view, step, index);
+    let number = (step.sample_index / BATCHES).wrapping_mul(inputs.view.directions).wrapping_add(j);
+    let coordinate = |d: u32| {
+        let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension + d);
+        unit(scramble(sobol(number, d as usize), key))
+    };
+    (coordinate(0), coordinate(1))
+}
+
+/// 1 if nothing is between a point and `distance` along `wi`, else 0. `normal` is the geometric one.
+pub(super) fn visibility(inputs: &Inputs, point: DVec3, normal: DVec3, wi: DVec3, distance: f64) -> f64 {
+    let origin = point + normal * f64::from(SHADOW_OFFSET);
+    if intersect::any(inputs.triangles, origin, wi, 0.0, distance) { 0.0 } else { 1.0 }
+}
+
+/// The contribution of the step's rays to pixel `index` of the band.
+pub fn accumulate(
+    inputs: &Inputs,
+    step: &Step,
+    index: u32,
+    surface: &Surface,
+    probe: &Probe,
+    hits: &Hits,
+) -> Contribution {
+    if hits.count == 0 || step.ray_count == 0 {
+        return Contribution::default();
+    }
+    let seen = seen(inputs, surface);
+    let material = material(inputs, surface);
+    let Some((chosen, factor)) = choose(inputs, step, index, material, &seen, probe, hits) else {
+        return Contribution::default();
+    };
+    let ior = f64::from(material.ior);
+    let point = surface.position.as_dvec3() + delta(probe, hits, chosen);
+    let entry = Entry::new(inputs, ior, seen.side, point, hits.triangle[chosen]);
+    let leaving = transmittance(ior, seen.shading_normal.dot(seen.wo));
+    Contribution::of(leaving * factor * entering_light(inputs, step, index, &entry))
+}
+
+/// From xo to hit `j`.
+fn delta(probe: &Probe, hits: &Hits, j: usize) -> DVec3 {
+    probe.offset.as_dvec3() + f64::from(hits.t[j]) * probe.direction.as_dvec3()
+}
+
+/// The hit that is lit, and its f / p including the weight of the choice; none if no hit weighs anything.
+pub fn choose(
+    inputs: &Inputs,
+    step: &Step,
+    index: u32,
+    material: &Material,
+    seen: &Seen,
+    probe: &Probe,
+    hits: &Hits,
+) -> Option<(usize, DVec3)> {
+    let normal = |j: usize| seen.side * geometric_normal(&inputs.triangles[hits.triangle[j] as usize]);
+    if inputs.features.projection == PROJECTION_CAMERA {
+        return Some((0, given_factor(material, seen, probe, delta(probe, hits, 0), normal(0))));
+    }
+    let stored = hits.count.min(MAX_HITS) as usize;
+    let strength = material.strength.as_dvec3();
+    let terms: Vec<(DVec3, f64)> = (0..stored)
+        .map(|j| {
+            let delta = delta(probe, hits, j);
+            let p = mixture_density(inputs.features.projection, material, seen, delta, normal(j));
+            let f = strength * shapes(material, delta.length());
+            if p > 0.0 { (f / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
+        })
+        .collect();
+    let total: f64 = terms.iter().map(|(_, w)| w).sum();
+    let threshold = coordinate(inputs, step, index, DIM_HIT) * total;
+    let mut sum = 0.0;
+    let chosen = terms.iter().position(|(_, w)| {
+        sum += w;
+        threshold < sum
+    });
+    let chosen = chosen.or_else(|| terms.iter().rposition(|(_, w)| *w > 0.0))?;
+    let (value, weight) = terms[chosen];
+    let lost = (f64::from(hits.count) / f64::from(MAX_HITS)).max(1.0);
+    Some((chosen, value * (total / weight) * lost))
+}
+
+/// f / p of the method as given.
+fn given_factor(material: &Material, seen: &Seen, probe: &Probe, delta: DVec3, normal: DVec3) -> DVec3 {
+    let rho = delta.length();
+    let (r, rate) = (f64::from(probe.radius), f64::from(material.camera_rate));
+    let d = probe.direction.as_dvec3();
+    let jacobian = seen.normal.dot(d).abs() / normal.dot(d).abs() * inverse_scale(seen, delta).powi(2);
+    let channel = |c: usize| {
+        let sigma = f64::from(material.sigma_tr[c]);
+        let source = |z: f64| {
+            let d = rho.hypot(z);
+            z * (1.0 + sigma * d) / (d * d * d) * (rate * r - sigma * d).exp()
+        };
+        (source(material.z_real[c].into()) + source(material.z_virtual[c].into())) / TAU
+    };
+    let profile = DVec3::from([0, 1, 2].map(channel));
+    material.strength.as_dvec3() * profile * (TAU * r / rate * jacobian)
+}
+
+/// A point where light enters.
+struct Entry {
+    point: DVec3,
+    /// Geometric normal on the camera's side of xo.
+    normal: DVec3,
+    /// Interpolated normal on that side.
+    shading: DVec3,
+    ior: f64,
+}
+
+impl Entry {
+    fn new(inputs: &Inputs, ior: f64, side: f64, point: DVec3, triangle: u32) -> Entry {
+        let shape = &inputs.triangles[triangle as usize];
+        let weights = barycentric(point - shape.corner.as_dvec3(), shape.edge1.as_dvec3(), shape.edge2.as_dvec3());
+        let shading = side * interpolated_normal(inputs, triangle, weights);
+        Entry { point, normal: side * geometric_normal(shape), shading, ior }
+    }
+
+    /// Ft(wi) cos; 0 below either horizon.
+    fn transmission(&self, wi: DVec3) -> f64 {
+        let cos = self.shading.dot(wi);
+        if self.normal.dot(wi) > 0.0 && cos > 0.0 { transmittance(self.ior, cos) * cos } else { 0.0 }
+    }
+}
+
+/// E: the light of the step's rays that enters.
+fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry) -> DVec3 {
+    let ray = |k: u32| -> DVec3 {
+        let (wi, irradiance, distance) = if let Some(light) = inputs.lights.get(k as usize) {
+            let incident = light::delta(light, entry.point);
+            (incident.wi, incident.irradiance, incident.distance)
+        } else {
+            let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_LIGHT);
+            let (wi, pdf) = environment_direction(inputs, entry.shading, u1, u2);
+            (wi, light::environment(inputs, wi) / (pdf * f64::from(inputs.view.directions)), FAR)
+        };
+        let transmission = entry.transmission(wi);
+        if transmission > 0.0 {
+            transmission * irradiance * visibility(inputs, entry.point, entry.normal, wi, distance)
+        } else {
+            DVec3::ZERO
+        }
+    };
+    (step.ray_begin..step.ray_begin + step.ray_count).map(ray).sum()
+}
+
+/// A direction towards the environment, and its density: cosine-weighted, or half of that and half of the image's.
+fn environment_direction(inputs: &Inputs, normal: DVec3, u1: f64, u2: f64) -> (DVec3, f64) {
+    let cosine_pdf = |wi: DVec3| normal.dot(wi).max(0.0) / PI;
+    if inputs.features.environment == ENVIRONMENT_CONSTANT {
+        let wi = cosine_direction(normal, u1, u2);
+        return (wi, cosine_pdf(wi));
+    }
+    let wi = if u1 < 0.5 {
+        light::sample_environment(inputs, 2.0 * u1, u2)
+    } else {
+        cosine_direction(normal, 2.0 * u1 - 1.0, u2)
+    };
+    (wi, 0.5 * light::environment_pdf(inputs, wi) + 0.5 * cosine_pdf(wi))
+}
+
+/// Weights of the second and third vertex of the point `corner + p` in the plane of a triangle.
+fn barycentric(p: DVec3, edge1: DVec3, edge2: DVec3) -> DVec2 {
+    let normal = edge1.cross(edge2);
+    let scale = normal.length_squared();
+    DVec2::new(p.cross(edge2).dot(normal) / scale, edge1.cross(p).dot(normal) / scale)
+}

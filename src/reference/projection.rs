@@ -1,0 +1,168 @@
+//! How points of the tangent plane are carried to the surface, and with which density they arrive there.
+//!
+//! # Techniques
+//! A technique is a plane through xo with a density p_T, and lines that carry its points to the surface. The density per
+//! area of the surface at x = xo + D, with normal n_x:
+//!
+//! - lines parallel to the unit vector a, plane perpendicular to a (A. King et al., "BSSRDF importance sampling",
+//!   SIGGRAPH 2013 talks): p_a(x) = p_T(|D - (D.a) a|) |n_x.a|;
+//! - lines from the eye at distance l along wo, plane tangent with normal no. A point y of the plane and its image x on
+//!   the line span the same solid angle, so dA/dA_tan = (no.-d) / (n_x.-d) |x - e|^2 / |y - e|^2. With
+//!   q = |y - e| / |x - e| = 1 / (1 - (D.no) / (l wo.no)):
+//!
+//!     y - xo = q [D - wo (D.no) / (wo.no)],   p_C(x) = p_T(|y - xo|) |n_x.d| / |no.d| q^2,   d = normalize(D / l - wo),
+//!
+//!   zero behind the eye (1/q <= 0). 1/l = 0 is an orthographic camera.
+//!
+//! p_T(r) = sum of b_c shape_c(r) / mass_c over the channels; see [`profile`](super::profile).
+//!
+//! # Combination
+//! The normal axis, two tangent axes and the camera are chosen with the fractions a_k, and every point found is divided
+//! by p = sum a_k p_k (balance heuristic, E. Veach, L. Guibas, SIGGRAPH 1995, one-sample model). Since |n.N| + |n.U| +
+//! |n.V| >= 1, and p_T falls with r, which an axis only shortens, p >= a_min p_T(|D|): a hit weighs at most 1/a_min
+//! times what it weighs on a plane, on any surface. Camera rays alone have an unbounded weight at silhouettes (n_x.d =
+//! 0), where the fraction a_C goes to 0 smoothly. Fractions depend on xo only.
+
+use super::Inputs;
+use super::math::basis;
+use super::profile::Dipole;
+use crate::shared::{Material, PROJECTION_CAMERA, PROJECTION_NORMAL, Surface, Triangle};
+use glam::DVec3;
+
+/// The techniques, in the order in which they are chosen.
+pub const NORMAL: usize = 0;
+pub const TANGENT_U: usize = 1;
+pub const TANGENT_V: usize = 2;
+pub const CAMERA: usize = 3;
+
+/// Cosine of view below which the camera's fraction decreases.
+const FADE: f64 = 0.3;
+
+/// A surface as the camera sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Unit vector to the eye.
+    pub wo: DVec3,
+    /// Distance to the eye, or to an orthographic camera's plane.
+    pub eye_distance: f64,
+    /// 1 / distance to the eye; 0 for an orthographic camera.
+    pub inverse_distance: f64,
+    /// 1 if the outside faces the camera, else -1.
+    pub side: f64,
+    /// Geometric normal on the camera's side.
+    pub normal: DVec3,
+    /// Interpolated normal on that side; the geometric one where the interpolated one faces away.
+    pub shading_normal: DVec3,
+    /// Axes N, U, V: the normal and two tangents.
+    pub axes: [DVec3; 3],
+}
+
+/// Unit normal of a triangle, out of the matter.
+pub fn geometric_normal(triangle: &Triangle) -> DVec3 {
+    triangle.edge1.as_dvec3().cross(triangle.edge2.as_dvec3()).normalize()
+}
+
+/// Interpolated unit normal of triangle `index`, out of the matter.
+pub fn interpolated_normal(inputs: &Inputs, index: u32, barycentric: glam::DVec2) -> DVec3 {
+    let shading = &inputs.shadings[index as usize];
+    let (b1, b2) = (barycentric.x, barycentric.y);
+    let sum = shading.normal0.as_dvec3() * (1.0 - b1 - b2)
+        + shading.normal1.as_dvec3() * b1
+        + shading.normal2.as_dvec3() * b2;
+    sum.normalize()
+}
+
+/// What the camera sees of a surface that it hit.
+pub fn seen(inputs: &Inputs, surface: &Surface) -> Seen {
+    let view = inputs.view;
+    let from_pivot = surface.position.as_dvec3() - view.pivot.as_dvec3();
+    let forward = view.forward.as_dvec3();
+    let perspective = f64::from(view.perspective);
+    let to = forward + perspective * from_pivot;
+    let wo = -to.normalize();
+    let eye_distance =
+        if view.perspective > 0.0 { to.length() } else { f64::from(view.reach) + from_pivot.dot(forward) };
+    let outward = geometric_normal(&inputs.triangles[surface.triangle as usize]);
+    let side = if outward.dot(wo) < 0.0 { -1.0 } else { 1.0 };
+    let normal = side * outward;
+    let interpolated = side * interpolated_normal(inputs, surface.triangle, surface.barycentric.as_dvec2());
+    let shading_normal = if interpolated.dot(wo) > 0.0 { interpolated } else { normal };
+    let (u, v) = basis(normal);
+    Seen {
+        wo,
+        eye_distance,
+        inverse_distance: perspective / to.length(),
+        side,
+        normal,
+        shading_normal,
+        axes: [normal, u, v],
+    }
+}
+
+/// Material of the surface's triangle.
+pub fn material<'a>(inputs: &Inputs<'a>, surface: &Surface) -> &'a Material {
+    &inputs.materials[inputs.shadings[surface.triangle as usize].material as usize]
+}
+
+/// Fractions of the techniques at a point seen with cosine `cos`.
+pub fn fractions(projection: u32, cos: f64) -> [f64; 4] {
+    match projection {
+        PROJECTION_CAMERA => [0.0, 0.0, 0.0, 1.0],
+        PROJECTION_NORMAL => [1.0, 0.0, 0.0, 0.0],
+        _ => {
+            let s = (cos / FADE).clamp(0.0, 1.0);
+            let camera = 0.4 * s * s * (3.0 - 2.0 * s);
+            let rest = 1.0 - camera;
+            [rest * 2.0 / 3.0, rest / 6.0, rest / 6.0, camera]
+        }
+    }
+}
+
+/// The dipole of channel `c` of a material; only its shape is known there, so the albedo is 1.
+pub fn dipole(material: &Material, c: usize) -> Dipole {
+    Dipole {
+        albedo: 1.0,
+        sigma_tr: f64::from(material.sigma_tr[c]),
+        z_real: f64::from(material.z_real[c]),
+        z_virtual: f64::from(material.z_virtual[c]),
+    }
+}
+
+/// shape(r) of the three channels.
+pub fn shapes(material: &Material, r: f64) -> DVec3 {
+    DVec3::from([0, 1, 2].map(|c| dipole(material, c).shape(r)))
+}
+
+/// p_T(r): density of the points in a technique's plane.
+pub fn plane_density(material: &Material, r: f64) -> f64 {
+    material.density.as_dvec3().dot(shapes(material, r))
+}
+
+/// 1/q, the camera's rescaling between plane and surface; not positive behind the eye.
+pub fn inverse_scale(seen: &Seen, delta: DVec3) -> f64 {
+    1.0 - delta.dot(seen.normal) * seen.inverse_distance / seen.wo.dot(seen.normal)
+}
+
+/// Density per area at xo + `delta` of one technique, where the surface's normal is `normal`.
+pub fn density(technique: usize, material: &Material, seen: &Seen, delta: DVec3, normal: DVec3) -> f64 {
+    if technique != CAMERA {
+        let axis = seen.axes[technique];
+        let r = (delta - delta.dot(axis) * axis).length();
+        return plane_density(material, r) * normal.dot(axis).abs();
+    }
+    let k = inverse_scale(seen, delta);
+    if k <= 0.0 {
+        return 0.0;
+    }
+    let q = 1.0 / k;
+    let r = q * (delta - seen.wo * (delta.dot(seen.normal) / seen.wo.dot(seen.normal))).length();
+    let d = (delta * seen.inverse_distance - seen.wo).normalize();
+    plane_density(material, r) * normal.dot(d).abs() / seen.normal.dot(d).abs() * q * q
+}
+
+/// Density per area at xo + `delta` of all techniques together.
+pub fn mixture_density(projection: u32, material: &Material, seen: &Seen, delta: DVec3, normal: DVec3) -> f64 {
+    let fractions = fractions(projection, seen.normal.dot(seen.wo));
+    let part = |(k, a): (usize, f64)| if a > 0.0 { a * density(k, material, seen, delta, normal) } else { 0.0 };
+    fractions.into_iter().enumerate().map(part).sum()
+}

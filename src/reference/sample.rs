@@ -1,0 +1,102 @@
+//! Draws the probe ray of a sample: radius, angle, channel and technique. Twin of `sample.comp`.
+//!
+//! `mis` and `normal` draw the radius from the profile itself ([`Dipole::radius`](super::profile::Dipole::radius)), so
+//! that on a plane every sample has the same weight, and look for surfaces in the ball of radius `radius_max`: the same
+//! region for every technique, as the balance heuristic requires. `camera` draws it from
+//! sigma e^(-sigma r) / (2 pi r) with the one rate `camera_rate`, and follows the camera ray from the eye.
+
+use super::projection::{CAMERA, dipole, fractions, material, seen};
+use super::random::{batch, key, scramble, unit};
+use super::{Inputs, pixel, profile};
+use crate::shared::{
+    DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, PROJECTION_CAMERA, Probe, Step, Surface, TRANSLUCENT,
+};
+use std::f64::consts::TAU;
+
+/// Half the length of an unbounded probe.
+const UNBOUNDED: f64 = profile::UNBOUNDED as f64;
+
+/// No probe: an empty interval.
+pub const NONE: Probe =
+    Probe { offset: glam::Vec3::ZERO, direction: glam::Vec3::ZERO, t_min: 1.0, t_max: 0.0, radius: 0.0 };
+
+/// Coordinate `dimension` (one of the estimator's) of the step's sample at pixel `index`.
+pub fn coordinate(inputs: &Inputs, step: &Step, index: u32, dimension: u32) -> f64 {
+    let (px, py) = pixel(inputs.view, step, index);
+    let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension);
+    unit(scramble(step.point[dimension as usize], key))
+}
+
+/// The probe of pixel `index` of the band, whose first surface is `surface`.
+pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Probe {
+    if surface.triangle == MISS {
+        return NONE;
+    }
+    let material = material(inputs, surface);
+    if material.flags & TRANSLUCENT == 0 || material.component_cdf[5] == 0.0 {
+        return NONE;
+    }
+    let seen = seen(inputs, surface);
+    let u = |dimension| coordinate(inputs, step, index, dimension);
+    let given = inputs.features.projection == PROJECTION_CAMERA;
+
+    let fractions = fractions(inputs.features.projection, seen.normal.dot(seen.wo));
+    let technique = first_above(u(DIM_TECHNIQUE), &fractions);
+
+    let r = if given {
+        -(-u(DIM_RADIUS)).ln_1p() / f64::from(material.camera_rate)
+    } else {
+        let cdf = material.component_cdf;
+        let pick = u(DIM_COMPONENT);
+        let component = cdf.iter().position(|&c| pick < f64::from(c)).unwrap_or(cdf.len() - 1);
+        let dipole = dipole(material, component / 2);
+        let z = if component % 2 == 0 { dipole.z_real } else { dipole.z_virtual };
+        dipole.radius(u(DIM_RADIUS), z)
+    };
+
+    let [n, tangent, bitangent] = seen.axes;
+    let (axis, x, y) = match technique {
+        1 => (tangent, bitangent, n),
+        2 => (bitangent, n, tangent),
+        _ => (-n, tangent, bitangent),
+    };
+    let (sin, cos) = (TAU * u(DIM_ANGLE)).sin_cos();
+    let offset = r * (cos * x + sin * y);
+    let direction = if technique == CAMERA { (offset * seen.inverse_distance - seen.wo).normalize() } else { axis };
+
+    let (mut t_min, mut t_max) = (-UNBOUNDED, UNBOUNDED);
+    if !given && material.radius_max < profile::UNBOUNDED {
+        let radius = f64::from(material.radius_max);
+        let middle = -offset.dot(direction);
+        let half = middle * middle - (offset.length_squared() - radius * radius);
+        if half < 0.0 {
+            return NONE;
+        }
+        (t_min, t_max) = (middle - half.sqrt(), middle + half.sqrt());
+    }
+    if technique == CAMERA {
+        let from_eye = if inputs.view.perspective > 0.0 {
+            (offset - seen.wo * seen.eye_distance).length()
+        } else {
+            seen.eye_distance + offset.dot(inputs.view.forward.as_dvec3())
+        };
+        t_min = t_min.max(-from_eye);
+    }
+    Probe {
+        offset: offset.as_vec3(),
+        direction: direction.as_vec3(),
+        t_min: t_min as f32,
+        t_max: t_max as f32,
+        radius: r as f32,
+    }
+}
+
+/// The first entry whose cumulative share exceeds u; rounding may leave none, then the last that has a share.
+fn first_above(u: f64, shares: &[f64]) -> usize {
+    let mut sum = 0.0;
+    let found = shares.iter().position(|share| {
+        sum += share;
+        u < sum
+    });
+    found.or_else(|| shares.iter().rposition(|&share| share > 0.0)).unwrap_or(0)
+}

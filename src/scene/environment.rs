@@ -1,0 +1,100 @@
+//! Environments: constant, or a latitude-longitude image in .hdr or .exr.
+
+use super::{Environment, EnvironmentMap};
+use crate::{Error, Result};
+use glam::{DVec3, Vec3};
+use std::path::Path;
+
+impl Environment {
+    /// The same radiance from everywhere.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for radiance that is negative or not finite.
+    pub fn constant(radiance: DVec3) -> Result<Environment> {
+        let environment = Environment { map: EnvironmentMap::Constant(radiance), ..Environment::default() };
+        environment.check()?;
+        Ok(environment)
+    }
+
+    /// Reads a latitude-longitude image: Radiance .hdr, or the first layer with R, G, B of an OpenEXR file.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file cannot be read or decoded; [`Error::Scene`] naming the texel for radiance that is
+    /// negative or not finite. Nothing is clamped.
+    pub fn load(path: impl AsRef<Path>) -> Result<Environment> {
+        let path = path.as_ref();
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("").to_lowercase();
+        let (width, height, radiance) = match extension.as_str() {
+            "hdr" => read_hdr(path)?,
+            "exr" => read_exr(path)?,
+            _ => return Err(Error::file(path, "an environment is a .hdr or .exr file")),
+        };
+        if let Some((texel, problem)) = first_wrong(&radiance) {
+            let (column, row) = (texel as u32 % width, texel as u32 / width);
+            return Err(Error::scene(path, format!("texel ({column}, {row})"), problem));
+        }
+        if radiance.is_empty() {
+            return Err(Error::file(path, "holds no texels"));
+        }
+        Ok(Environment { map: EnvironmentMap::Image { width, height, radiance }, ..Environment::default() })
+    }
+
+    /// What [`Scene::set_environment`](super::Scene::set_environment) demands.
+    pub(super) fn check(&self) -> Result<()> {
+        let wrong = |problem: String| Err(Error::setting("environment", problem));
+        match &self.map {
+            EnvironmentMap::None => {}
+            EnvironmentMap::Constant(radiance) => {
+                if !(radiance.is_finite() && radiance.min_element() >= 0.0) {
+                    return wrong(format!(
+                        "the radiance is {:?}; it must be finite, not negative",
+                        radiance.to_array()
+                    ));
+                }
+            }
+            EnvironmentMap::Image { width, height, radiance } => {
+                if radiance.is_empty() || *width as u64 * *height as u64 != radiance.len() as u64 {
+                    return wrong(format!("{width} x {height} is not the size of {} texels", radiance.len()));
+                }
+                if let Some((texel, problem)) = first_wrong(radiance) {
+                    return wrong(format!("texel {texel} {problem}"));
+                }
+            }
+        }
+        if !self.rotation.is_finite() {
+            return wrong(format!("the rotation is {}", self.rotation));
+        }
+        if !(self.scale.is_finite() && self.scale >= 0.0) {
+            return wrong(format!("the scale is {}; it must be finite, not negative", self.scale));
+        }
+        Ok(())
+    }
+}
+
+/// The first texel that is no radiance, and what is wrong with it.
+fn first_wrong(radiance: &[Vec3]) -> Option<(usize, String)> {
+    let texel = radiance.iter().position(|texel| !(texel.is_finite() && texel.min_element() >= 0.0))?;
+    Some((texel, format!("is {:?}; radiance must be finite, not negative", radiance[texel].to_array())))
+}
+
+fn read_hdr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
+    let mut reader = image::ImageReader::open(path).map_err(|error| Error::file(path, error))?;
+    reader.set_format(image::ImageFormat::Hdr);
+    let image = reader.decode().map_err(|error| Error::file(path, error))?.into_rgb32f();
+    let (width, height) = image.dimensions();
+    Ok((width, height, image.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect()))
+}
+
+fn read_exr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
+    let image = exr::prelude::read_first_rgba_layer_from_file(
+        path,
+        |size, _| (size.width(), vec![Vec3::ZERO; size.area()]),
+        |(width, texels), position, (r, g, b, _): (f32, f32, f32, f32)| {
+            texels[position.y() * *width + position.x()] = Vec3::new(r, g, b);
+        },
+    )
+    .map_err(|error| Error::file(path, error))?;
+    let size = image.layer_data.size;
+    let (_, texels) = image.layer_data.channel_data.pixels;
+    Ok((size.width() as u32, size.height() as u32, texels))
+}

@@ -1,0 +1,75 @@
+//! From metres to internal units: centre, scale, and the geometry in f32.
+
+use super::mesh::Triangle;
+use super::{Frame, Material};
+use crate::{Error, Result, shared};
+use glam::{DVec3, Vec3};
+use std::path::Path;
+
+/// Radii of the frame's geometry [m] whose squares f64 and f32 can hold.
+const RADIUS_RANGE: (f64, f64) = (1e-12, 1e12);
+/// Largest internal coordinate: beyond it, f32 boxes and areas lose their meaning.
+const COORDINATE_MAX: f64 = 1e9;
+/// Least twice-area in internal units of which f32 can form a normal.
+const AREA_MIN: f64 = 1e-18;
+
+/// The frame in which the translucent triangles (all of them, if none is) are centred on 0 with radius 1.
+///
+/// The centre is that of their bounding box; the radius is the distance of the farthest vertex from it.
+pub(super) fn around(file: &Path, triangles: &[Triangle], materials: &[Material]) -> Result<Frame> {
+    let translucent = |triangle: &&Triangle| materials[triangle.material as usize].medium.is_some();
+    let any = triangles.iter().any(|triangle| translucent(&triangle));
+    let framed: Vec<&Triangle> = triangles.iter().filter(|triangle| !any || translucent(triangle)).collect();
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
+    for vertex in framed.iter().flat_map(|triangle| vertices(triangle)) {
+        low = low.min(vertex);
+        high = high.max(vertex);
+    }
+    let centre = 0.5 * (low + high);
+    let square = |vertex: DVec3| (vertex - centre).length_squared();
+    let radius = framed.iter().flat_map(|triangle| vertices(triangle)).map(square).fold(0.0, f64::max).sqrt();
+    if !(RADIUS_RANGE.0..=RADIUS_RANGE.1).contains(&radius) {
+        let (low, high) = RADIUS_RANGE;
+        return Err(Error::scene(file, "scene", format!("its radius is {radius} m, not from {low} to {high}")));
+    }
+    Ok(Frame { centre, scale: 1.0 / radius })
+}
+
+/// The geometry in internal units, and the count of triangles too small for them.
+pub(super) fn internal(
+    file: &Path,
+    frame: &Frame,
+    triangles: &[Triangle],
+) -> Result<(Vec<shared::Triangle>, Vec<shared::Shading>, u64)> {
+    let mut kept = Vec::with_capacity(triangles.len());
+    let mut shadings = Vec::with_capacity(triangles.len());
+    let mut dropped = 0;
+    for triangle in triangles {
+        for vertex in vertices(triangle) {
+            let reach = ((vertex - frame.centre) * frame.scale).abs().max_element();
+            if reach > COORDINATE_MAX {
+                let problem = format!("reaches {reach:e} times as far as the translucent part's radius");
+                return Err(Error::scene(file, "scene", problem));
+            }
+        }
+        let corner = ((triangle.corner - frame.centre) * frame.scale).as_vec3();
+        let edge1 = (triangle.edge1 * frame.scale).as_vec3();
+        let edge2 = (triangle.edge2 * frame.scale).as_vec3();
+        if !(edge1.as_dvec3().cross(edge2.as_dvec3()).length() > AREA_MIN) {
+            dropped += 1;
+            continue;
+        }
+        kept.push(shared::Triangle { corner, edge1, edge2, set: triangle.set });
+        let [normal0, normal1, normal2]: [Vec3; 3] = triangle.normals;
+        shadings.push(shared::Shading { normal0, normal1, normal2, material: triangle.material });
+    }
+    if kept.is_empty() {
+        return Err(Error::scene(file, "scene", "has no triangle large enough for its size"));
+    }
+    Ok((kept, shadings, dropped))
+}
+
+fn vertices(triangle: &Triangle) -> [DVec3; 3] {
+    [triangle.corner, triangle.corner + triangle.edge1, triangle.corner + triangle.edge2]
+}

@@ -1,0 +1,271 @@
+//! Every stage of the pipeline on real scenes.
+
+use crate::{Case, assert_close};
+use glam::{DVec3, Vec3};
+use translucent::{
+    Projection, Scene, Settings,
+    reference::{self, Inputs, accumulate::accumulate, primary::primary, reflect::reflect, reproject::reproject, sample::sample},
+    scene::Environment,
+    shared::{BATCHES, Hits, MISS, Pixel, Probe, Slot, Step, Sums, Surface},
+};
+
+const SIZE: u32 = 48;
+
+/// The shipped scene under each kind of light, with each projection.
+fn cases() -> Vec<(String, Case)> {
+    let demo = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo.gltf")).expect("the shipped scene loads");
+    let constant = Environment::constant(DVec3::new(0.5, 0.7, 1.0));
+    let texel = |i: u32| Vec3::new(0.1 + (i % 7) as f32, 0.2 + (i % 5) as f32, 0.3 + (i % 11) as f32);
+    let image = Environment {
+        map: translucent::scene::EnvironmentMap::Image { width: 16, height: 8, radiance: (0..128).map(texel).collect() },
+        rotation: 40.0,
+        scale: 0.3,
+    };
+    let mut cases = vec![];
+    for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
+        for (name, environment) in [("delta", None), ("constant", Some(&constant)), ("image", Some(&image))] {
+            let mut scene = demo.clone();
+            if let Some(environment) = environment {
+                scene.set_environment(environment.clone()).expect("the environment is valid");
+                scene.lights.truncate(1);
+            }
+            let settings = Settings {
+                resolution: Some((SIZE, SIZE)),
+                projection,
+                directions: 2,
+                seed: 3,
+                show_environment: true,
+                ..Settings::default()
+            };
+            cases.push((format!("{projection:?}, {name}"), Case::new(scene, &settings)));
+        }
+    }
+    cases
+}
+
+/// What the twins give for one sample of every pixel.
+struct Stages {
+    step: Step,
+    surfaces: Vec<Surface>,
+    probes: Vec<Probe>,
+    hits: Vec<Hits>,
+}
+
+/// Samples from different batches and strata.
+const SAMPLES: [u32; 3] = [0, 37, 1003];
+
+fn stages(inputs: &Inputs, sample_index: u32) -> Stages {
+    let step = reference::step(inputs, sample_index, 0..SIZE, 0..2048);
+    let pixels = 0..step.pixel_count;
+    let surfaces: Vec<_> = pixels.clone().map(|i| primary(inputs, &step, i)).collect();
+    let probes: Vec<_> = pixels.clone().map(|i| sample(inputs, &step, i, &surfaces[i as usize])).collect();
+    let hits = pixels.map(|i| reproject(inputs, &step, i, &surfaces[i as usize], &probes[i as usize])).collect();
+    Stages { step, surfaces, probes, hits }
+}
+
+/// The G-buffers of all batches, of which the step's batch holds `surfaces`.
+fn g_buffers(step: &Step, surfaces: &[Surface]) -> Vec<Surface> {
+    let mut all = vec![Surface { triangle: MISS, ..Surface::default() }; surfaces.len() * BATCHES as usize];
+    let start = (step.sample_index % BATCHES) as usize * surfaces.len();
+    all[start..start + surfaces.len()].copy_from_slice(surfaces);
+    all
+}
+
+fn for_each_case(mut test: impl FnMut(&str, &Case, &Stages)) {
+    for (name, case) in cases() {
+        for sample_index in SAMPLES {
+            test(&format!("{name}, sample {sample_index}"), &case, &stages(&case.inputs(), sample_index));
+        }
+    }
+}
+
+/// Length of the difference over `scale`.
+fn error(gpu: Vec3, twin: Vec3, scale: f64) -> f64 {
+    (gpu.as_dvec3() - twin.as_dvec3()).length() / scale
+}
+
+#[test]
+fn primary_finds_the_twins_surface() {
+    let mut errors = vec![];
+    for_each_case(|_, case, stages| {
+        let surfaces = vec![Surface::default(); (stages.step.pixel_count * BATCHES) as usize];
+        let out = case.run("primary", &stages.step, &[(Slot::Surfaces, bytemuck::cast_slice(&surfaces))]);
+        let start = (stages.step.sample_index % BATCHES * stages.step.pixel_count) as usize;
+        let found = &out.get::<Surface>(Slot::Surfaces)[start..];
+        for (gpu, twin) in found.iter().zip(&stages.surfaces) {
+            // An edge between two triangles may go either way; the position is the same.
+            let both = (gpu.triangle == MISS) == (twin.triangle == MISS);
+            errors.push(if both { error(gpu.position, twin.position, 1.0) } else { f64::INFINITY });
+        }
+    });
+    assert_close("primary", &errors);
+}
+
+#[test]
+fn sample_draws_the_twins_probe() {
+    let mut errors = vec![];
+    for_each_case(|_, case, stages| {
+        let surfaces = g_buffers(&stages.step, &stages.surfaces);
+        let probes = vec![Probe::default(); stages.probes.len()];
+        let buffers: [(Slot, &[u8]); 2] =
+            [(Slot::Surfaces, bytemuck::cast_slice(&surfaces)), (Slot::Probes, bytemuck::cast_slice(&probes))];
+        let out = case.run("sample", &stages.step, &buffers).get::<Probe>(Slot::Probes);
+        for (gpu, twin) in out.iter().zip(&stages.probes) {
+            let chord = |p: &Probe| p.t_min <= p.t_max;
+            if !chord(twin) {
+                errors.push(if chord(gpu) { f64::INFINITY } else { 0.0 });
+                continue;
+            }
+            // Lengths against the probe's own size.
+            let scale = f64::from(twin.t_max - twin.t_min).min(1.0).max(f64::from(twin.offset.length()));
+            let ends = f64::from((gpu.t_min - twin.t_min).abs().max((gpu.t_max - twin.t_max).abs()));
+            let ends = if twin.t_max < 1e29 { ends } else { f64::from((gpu.t_min - twin.t_min).abs() / twin.t_min.abs()) };
+            let offset = error(gpu.offset, twin.offset, scale);
+            let radius = f64::from((gpu.radius - twin.radius).abs()) / scale;
+            errors.push(offset.max(error(gpu.direction, twin.direction, 1.0)).max(ends / scale).max(radius));
+        }
+    });
+    assert_close("sample", &errors);
+}
+
+#[test]
+fn reproject_finds_the_twins_hits() {
+    let mut errors = vec![];
+    let mut several = 0;
+    for_each_case(|_, case, stages| {
+        let surfaces = g_buffers(&stages.step, &stages.surfaces);
+        let hits = vec![Hits::default(); stages.hits.len()];
+        let buffers: [(Slot, &[u8]); 3] = [
+            (Slot::Surfaces, bytemuck::cast_slice(&surfaces)),
+            (Slot::Probes, bytemuck::cast_slice(&stages.probes)),
+            (Slot::HitLists, bytemuck::cast_slice(&hits)),
+        ];
+        let out = case.run("reproject", &stages.step, &buffers).get::<Hits>(Slot::HitLists);
+        for ((gpu, twin), probe) in out.iter().zip(&stages.hits).zip(&stages.probes) {
+            several += usize::from(twin.count > 1);
+            if gpu.count != twin.count {
+                errors.push(f64::INFINITY);
+                continue;
+            }
+            // Positions along the ray, against the probe's size.
+            let scale = f64::from(probe.t_max - probe.t_min).min(1.0).max(f64::from(probe.offset.length()));
+            let hit = |i: usize| f64::from((gpu.t[i] - twin.t[i]).abs()) / scale;
+            errors.push((0..twin.count.min(8) as usize).map(hit).fold(0.0, f64::max));
+        }
+    });
+    assert!(several > 100, "probes with several hits are tested");
+    assert_close("reproject", &errors);
+}
+
+/// The new sums over what they were, for a kernel that adds to them.
+fn run_sums(case: &Case, stem: &'static str, stages: &Stages) -> (Vec<Sums>, Vec<Vec3>) {
+    let surfaces = g_buffers(&stages.step, &stages.surfaces);
+    let sums = vec![Sums::default(); stages.surfaces.len()];
+    let batch_sums = vec![Vec3::ZERO; stages.surfaces.len() * BATCHES as usize];
+    let buffers: [(Slot, &[u8]); 5] = [
+        (Slot::Surfaces, bytemuck::cast_slice(&surfaces)),
+        (Slot::Probes, bytemuck::cast_slice(&stages.probes)),
+        (Slot::HitLists, bytemuck::cast_slice(&stages.hits)),
+        (Slot::RunningSums, bytemuck::cast_slice(&sums)),
+        (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
+    ];
+    let out = case.run(stem, &stages.step, &buffers);
+    let start = (stages.step.sample_index % BATCHES) as usize * stages.surfaces.len();
+    let batch = out.get::<Vec3>(Slot::BatchSums)[start..start + stages.surfaces.len()].to_vec();
+    (out.get(Slot::RunningSums), batch)
+}
+
+#[test]
+fn accumulate_adds_the_twins_radiance() {
+    let mut errors = vec![];
+    let mut lit = 0;
+    for_each_case(|name, case, stages| {
+        let (sums, batch) = run_sums(case, "accumulate", stages);
+        for (index, sums) in sums.iter().enumerate() {
+            let surface = &stages.surfaces[index];
+            let twin = accumulate(
+                &case.inputs(),
+                &stages.step,
+                index as u32,
+                surface,
+                &stages.probes[index],
+                &stages.hits[index],
+            );
+            assert_eq!((sums.samples, sums.covered), (1, u32::from(surface.triangle != MISS)), "{name}");
+            assert_eq!(sums.invalid, u32::from(twin.invalid), "{name}");
+            assert_eq!(batch[index], sums.subsurface, "{name}");
+            if twin.radiance == DVec3::ZERO {
+                errors.push(f64::from(sums.subsurface.length()));
+                continue;
+            }
+            lit += 1;
+            errors.push((sums.subsurface.as_dvec3() - twin.radiance).length() / twin.radiance.length());
+        }
+    });
+    assert!(lit > 3000, "{lit} lit samples");
+    assert_close("accumulate", &errors);
+}
+
+#[test]
+fn reflect_adds_the_twins_radiance() {
+    let mut errors = vec![];
+    let mut lit = 0;
+    for_each_case(|name, case, stages| {
+        let (sums, _) = run_sums(case, "reflect", stages);
+        for (index, sums) in sums.iter().enumerate() {
+            let twin = reflect(&case.inputs(), &stages.step, index as u32, &stages.surfaces[index]);
+            assert_eq!(sums.invalid, u32::from(twin.invalid), "{name}");
+            if twin.radiance == DVec3::ZERO {
+                errors.push(f64::from(sums.reflection.length()));
+                continue;
+            }
+            lit += 1;
+            errors.push((sums.reflection.as_dvec3() - twin.radiance).length() / twin.radiance.length());
+        }
+    });
+    assert!(lit > 3000, "{lit} lit samples");
+    assert_close("reflect", &errors);
+}
+
+#[test]
+fn resolve_gives_the_twins_pixel() {
+    let (_, case) = &cases()[0];
+    let range = (5, 41);
+    let pixels = 500;
+    let step =
+        Step { pixel_count: pixels, range_begin: range.0, range_end: range.1, ..reference::step(&case.inputs(), 0, 0..1, 0..1) };
+    // Numbers of many magnitudes, from a hash.
+    let number = |i: u32| 10f32.powf((reference::random::hash(i) % 4000) as f32 / 1000.0 - 2.0);
+    let vector = |i: u32| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));
+    let sums: Vec<Sums> = (0..pixels)
+        .map(|i| Sums {
+            subsurface: vector(i),
+            subsurface_carry: vector(i + 7000) * 1e-7,
+            reflection: vector(i + 1000),
+            reflection_carry: vector(i + 9000) * 1e-7,
+            samples: range.1 - range.0,
+            covered: i % (range.1 - range.0 + 1),
+            invalid: i,
+        })
+        .collect();
+    let batch_sums: Vec<Vec3> = (0..pixels * BATCHES).map(|i| vector(i + 20_000)).collect();
+    let out = vec![Pixel::default(); pixels as usize];
+    let buffers: [(Slot, &[u8]); 3] = [
+        (Slot::RunningSums, bytemuck::cast_slice(&sums)),
+        (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
+        (Slot::Pixels, bytemuck::cast_slice(&out)),
+    ];
+    let out = case.run("resolve", &step, &buffers).get::<Pixel>(Slot::Pixels);
+    let mut errors = vec![];
+    for (i, gpu) in out.iter().enumerate() {
+        let mine: Vec<Vec3> = (0..BATCHES as usize).map(|b| batch_sums[b * pixels as usize + i]).collect();
+        let twin = reference::resolve::resolve(&case.inputs().features, &step, &sums[i], &mine);
+        assert_eq!((gpu.samples, gpu.invalid), (twin.samples, twin.invalid));
+        assert!((gpu.alpha - twin.alpha).abs() <= 1e-6);
+        let relative = |a: Vec3, b: Vec3| error(a, b, f64::from(b.length()));
+        errors.push(relative(gpu.subsurface, twin.subsurface));
+        errors.push(relative(gpu.reflection, twin.reflection));
+        errors.push(relative(gpu.variance, twin.variance));
+    }
+    assert_close("resolve", &errors);
+}

@@ -1,0 +1,4 @@
+//! Scenes: what a file becomes, and what is said of files that break a rule.
+
+mod build;
+mod bvh;
