@@ -1,1 +1,44 @@
-fn main() {}
+//! The command line. It uses nothing but the library's public interface.
+
+mod program;
+
+use clap::{Parser, Subcommand};
+use program::{merge::Merge, render::Render, tables};
+use std::process::ExitCode;
+
+/// Renders translucent matter (marble, skin, milk, wax) in glTF scenes with Vulkan compute.
+#[derive(Parser)]
+#[command(
+    version,
+    after_help = "Exit status: 0 done, 1 failed, 2 wrong usage or input, 3 interrupted with a usable \
+                                 partial image written."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a glTF scene to an EXR image.
+    Render(Box<Render>),
+    /// Put the parts of a larger render together, weighted by samples.
+    Merge(Merge),
+    /// List every named material with its coefficients, mean free path and colour.
+    Presets,
+    /// List every Vulkan device with what it lacks.
+    Devices,
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Render(render) => render.run(),
+        Command::Merge(merge) => merge.run(),
+        Command::Presets => tables::presets(),
+        Command::Devices => tables::devices(),
+    };
+    result.unwrap_or_else(|failure| {
+        eprintln!("error: {}", failure.message);
+        failure.code
+    })
+}

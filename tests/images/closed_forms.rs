@@ -138,7 +138,7 @@ fn sphere_in_uniform_light_is_flat() {
                     (mean - 1.0).abs() < 4.0 * error + deficit + curvature,
                     "distance {distance}, sigma_tr R = {sigma_tr_radius}, class {class}: {mean} +- {error}"
                 );
-                assert!(values.len() > 20 && error < 0.02, "class {class}: {} values, +- {error}", values.len());
+                assert!(values.len() > 20 && error < 0.03, "class {class}: {} values, +- {error}", values.len());
             }
         }
     }
@@ -158,17 +158,17 @@ fn sphere_emits_what_enters_it() {
     let mesh = Mesh::sphere(radius, 40);
     let light = (sun(), DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO);
     let (mut flux, mut variance) = (0.0, 0.0);
-    let resolution = 40;
+    let resolution = 120;
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         for direction in [axis, -axis] {
             let eye = Eye { eye: direction * 10.0, at: DVec3::ZERO, lens: -1.05 };
             let scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, std::slice::from_ref(&light), &eye));
             let settings = Settings { resolution: Some((resolution, resolution)), seed: 9, ..Settings::default() };
-            let image = render(&scene, &settings, 64);
+            let image = render(&scene, &settings, 16);
             let pixel_area = (2.1 / f64::from(resolution)).powi(2);
             for i in 0..(resolution * resolution) as usize {
                 let at = |name: &str| f64::from(channel(&image, name)[i]);
-                if at("A") < 1.0 {
+                if at("material.Y") < 0.0 {
                     continue;
                 }
                 let cos = DVec3::new(at("N.X"), at("N.Y"), at("N.Z")).dot(direction);
@@ -180,9 +180,10 @@ fn sphere_emits_what_enters_it() {
         }
     }
     let error = variance.sqrt();
-    // Left out: pixels on the rim, where cos is small: a share of int cos^2 below cos = .3, some .5 %; the mesh .2 %.
-    assert!((flux - expected).abs() < 4.0 * error + 0.007 * expected, "{flux} +- {error}, not {expected}");
-    assert!(error < 0.01 * expected);
+    // Pixels on the rim whose middle misses the sphere are left out. Within half a pixel of the rim cos is below .13, and
+    // int cos^2 dA up to there is .13^3 of the whole: .2 %. The mesh adds as much.
+    assert!((flux - expected).abs() < 4.0 * error + 0.004 * expected, "{flux} +- {error}, not {expected}");
+    assert!(error < 0.005 * expected, "{error} of {expected}");
 }
 
 #[test]

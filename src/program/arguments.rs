@@ -1,0 +1,76 @@
+//! The forms in which values stand on the command line.
+
+use std::ops::Range;
+use translucent::{CameraChoice, scene::parse_unit};
+
+/// Most samples of a pixel: attributes of EXR files are 32-bit integers.
+const MAX_SAMPLES: u32 = i32::MAX as u32;
+
+/// What an environment is made from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EnvironmentSource {
+    Constant([f64; 3]),
+    File(std::path::PathBuf),
+}
+
+/// `512x512`.
+pub fn resolution(text: &str) -> Result<(u32, u32), String> {
+    let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    parts.filter(|&(w, h)| w > 0 && h > 0).ok_or("it is WIDTHxHEIGHT, such as 1024x768".into())
+}
+
+/// `64`, or `64:128` for samples 64 to 127.
+pub fn samples(text: &str) -> Result<Range<u32>, String> {
+    let range = match text.split_once(':') {
+        None => text.parse().ok().map(|end| 0..end),
+        Some((begin, end)) => begin.parse().ok().zip(end.parse().ok()).map(|(begin, end)| begin..end),
+    };
+    range
+        .filter(|range| range.start < range.end && range.end <= MAX_SAMPLES)
+        .ok_or(format!("it is M or A:B, with 0 <= A < B <= {MAX_SAMPLES}"))
+}
+
+/// An index or a name.
+pub fn camera(text: &str) -> Result<CameraChoice, String> {
+    Ok(text.parse().map_or_else(|_| CameraChoice::Name(text.into()), CameraChoice::Index))
+}
+
+/// `constant:R,G,B` or a file.
+pub fn environment(text: &str) -> Result<EnvironmentSource, String> {
+    let Some(values) = text.strip_prefix("constant:") else { return Ok(EnvironmentSource::File(text.into())) };
+    let values = list::<f64, 3>(values).filter(|values| values.iter().all(|v| v.is_finite() && *v >= 0.0));
+    values.map(EnvironmentSource::Constant).ok_or("it is constant:R,G,B with three values >= 0, or a file".into())
+}
+
+/// `NAME=PRESET`.
+pub fn material(text: &str) -> Result<(String, String), String> {
+    // A material's name may hold an equals sign, a preset's does not.
+    let parts = text.rsplit_once('=').filter(|(_, preset)| !preset.is_empty());
+    parts.map(|(name, preset)| (name.into(), preset.into())).ok_or("it is NAME=PRESET, such as skin=skin1".into())
+}
+
+/// A length such as `cm` or `29.2mm` [m].
+pub fn unit(text: &str) -> Result<f64, String> {
+    parse_unit(text).map_err(|error| error.to_string())
+}
+
+/// `X0,Y0,X1,Y1`.
+pub fn crop(text: &str) -> Result<[u32; 4], String> {
+    let corners = list::<u32, 4>(text).filter(|[x0, y0, x1, y1]| x0 < x1 && y0 < y1);
+    corners.ok_or("it is X0,Y0,X1,Y1 in pixels, X0 < X1 and Y0 < Y1".into())
+}
+
+/// A finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or("it is a finite number".into())
+}
+
+/// A finite number of at least 0.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|value| *value >= 0.0).ok_or("it is a finite number of at least 0".into())
+}
+
+fn list<T: std::str::FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let values: Option<Vec<T>> = text.split(',').map(|value| value.trim().parse().ok()).collect();
+    values?.try_into().ok()
+}
