@@ -65,7 +65,7 @@ pub struct Render {
           value_parser = arguments::finite)]
     environment_rotation: Option<f64>,
     /// Factor on the environment's radiance.
-    #[arg(long, value_name = "S", requires = "environment", value_parser = arguments::not_negative)]
+    #[arg(long, value_name = "S", requires = "environment", allow_negative_numbers = true, value_parser = arguments::not_negative)]
     environment_scale: Option<f64>,
     /// Show the environment where no surface is.
     #[arg(long)]
@@ -91,7 +91,7 @@ pub struct Render {
     #[arg(long, value_name = "EV", requires = "png", allow_negative_numbers = true, value_parser = arguments::finite)]
     exposure: Option<f64>,
     /// Key of all random numbers.
-    #[arg(long, value_name = "S", default_value_t = 0)]
+    #[arg(long, value_name = "S", default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
     /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
     #[arg(long, value_name = "INDEX|NAME|UUID")]
