@@ -1,6 +1,6 @@
 //! `render`: a glTF scene becomes an EXR image, and a PNG where one is asked for.
 
-use super::{Failure, INTERRUPTED, arguments, arguments::EnvironmentSource, print};
+use super::{Failure, INTERRUPTED, arguments, arguments::EnvironmentSource, keep, print};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -166,6 +166,9 @@ impl Render {
                 return Err(Failure::input(format!("{}: its name must end in .{extension}", path.display())));
             }
             check_writable(path)?;
+            if let Some(EnvironmentSource::File(environment)) = &self.environment {
+                keep(environment, path)?;
+            }
         }
         Ok(output)
     }
@@ -240,9 +243,9 @@ impl Render {
 fn show(bar: &ProgressBar, done: u64, total: u64, samples: &Range<u32>, start: Instant) {
     let rate = done as f64 / start.elapsed().as_secs_f64().max(1e-9) * 1e-6;
     let each = done as f64 / total.max(1) as f64 * samples.len() as f64;
+    bar.set_message(format!("{each:.0}/{} samples  {rate:.3} Msamples/s", samples.len()));
     bar.set_length(total);
     bar.set_position(done);
-    bar.set_message(format!("{each:.0}/{} samples  {rate:.3} Msamples/s", samples.len()));
 }
 
 /// A flag that the first Ctrl-C sets; the second ends the program at once.

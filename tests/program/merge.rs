@@ -80,4 +80,7 @@ fn what_does_not_belong_together_is_refused_with_both_names() {
         assert!(files.iter().filter(|file| message.contains(file.as_str())).count() >= 2, "{parts}: {message}");
         assert_eq!(folder.files(), before, "{parts}");
     }
+    let overwrite = folder.run("merge first.exr second.exr -o second.exr");
+    assert_eq!(overwrite.status.code(), Some(2));
+    assert_eq!(integer(&folder.image("second.exr"), "samples"), 8);
 }
