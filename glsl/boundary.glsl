@@ -17,18 +17,18 @@ float transmittance(float ior, float cos_outside) {
     return 1.0 - fresnel(ior, cos_outside);
 }
 
-// GGX normal distribution; cos_h = n.h.
-float ggx_distribution(float alpha, float cos_h) {
+// Directions are in the frame where n = z; squared sines come from x and y, which keeps their digits near n.
+
+// GGX normal distribution.
+float ggx_distribution(float alpha, vec3 h) {
     float a2 = alpha * alpha;
-    // 1 - cos^2 (1 - a2) without the cancellation near cos = 1.
-    float t = (1.0 - cos_h) * (1.0 + cos_h) + a2 * cos_h * cos_h;
+    float t = dot(h.xy, h.xy) + a2 * h.z * h.z;
     return a2 / (PI * t * t);
 }
 
-// Smith's Lambda, for cos > 0.
-float ggx_lambda(float alpha, float c) {
-    float tan2 = (1.0 - c) * (1.0 + c) / (c * c);
-    return 0.5 * (sqrt(1.0 + alpha * alpha * tan2) - 1.0);
+// Smith's Lambda, above the horizon.
+float ggx_lambda(float alpha, vec3 w) {
+    return 0.5 * (sqrt(1.0 + alpha * alpha * dot(w.xy, w.xy) / (w.z * w.z)) - 1.0);
 }
 
 // A half vector with the density of visible normals (Heitz 2018); wo in the frame where n = z.

@@ -18,8 +18,8 @@ SURFACES(readonly);
 vec3 reflected(Material m, bool translucent, float alpha, vec3 wo, vec3 wi) {
     vec3 h = normalize(wo + wi);
     float cos_h = dot(wo, h);
-    float visibility = 1.0 / (1.0 + ggx_lambda(alpha, wo.z) + ggx_lambda(alpha, wi.z));
-    float specular = ggx_distribution(alpha, h.z) * visibility / (4.0 * wo.z);
+    float visibility = 1.0 / (1.0 + ggx_lambda(alpha, wo) + ggx_lambda(alpha, wi));
+    float specular = ggx_distribution(alpha, h) * visibility / (4.0 * wo.z);
     if (translucent) return vec3(fresnel(m.ior, cos_h) * specular);
     float f0 = (m.ior - 1.0) / (m.ior + 1.0);
     vec3 normal_incidence = mix(vec3(f0 * f0), m.base_color, m.metallic);
@@ -31,7 +31,7 @@ vec3 reflected(Material m, bool translucent, float alpha, vec3 wo, vec3 wi) {
 // Density of the visible normals' reflections.
 float visible_normal_density(float alpha, vec3 wo, vec3 wi) {
     vec3 h = normalize(wo + wi);
-    return ggx_distribution(alpha, h.z) / ((1.0 + ggx_lambda(alpha, wo.z)) * 4.0 * wo.z);
+    return ggx_distribution(alpha, h) / ((1.0 + ggx_lambda(alpha, wo)) * 4.0 * wo.z);
 }
 
 void main() {

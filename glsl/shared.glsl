@@ -13,7 +13,12 @@ const uint STRATUM = 4u;
 // Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
 const uint MAX_HITS = 8u;
 // Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
-const uint MAX_RAYS = 32u;
+const uint MAX_RAYS = 8u;
+// Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
+// roundings of a position. Creases narrower than this are lit as if open.
+const float SHADOW_OFFSET = 3.8146973e-6;
+// Least GGX width of an opaque material, which has no mirror.
+const float OPAQUE_ALPHA_MIN = 0.001;
 // Value of `Surface::triangle` for a ray that hits nothing.
 const uint MISS = 4294967295u;
 // Projection: all techniques combined by the balance heuristic.
@@ -124,8 +129,10 @@ struct Step {
     uint ray_begin;
     // Shadow rays of this dispatch; 0 where the scene has no light.
     uint ray_count;
-    // 1 in the sample's first dispatch of a kernel, which also counts the sample.
+    // 1 in the sample's first dispatch of `reflect`, which also adds what does not depend on shadow rays.
     uint first;
+    // 1 in the sample's first dispatch of all that add to the sums: it counts the sample.
+    uint count;
     // First sample of the whole range that is in the sums, for `resolve`.
     uint range_begin;
     // End of that range.
@@ -275,7 +282,7 @@ struct Pixel {
 #define ENVIRONMENT(access) layout(set = 0, binding = 6, scalar) access buffer EnvironmentBlock { vec3 environment[]; }
 // Environment sampling: density_height + 1 marginal values, then density_width + 1 for each row, all from 0 to 1.
 #define ENVIRONMENT_CDF(access) layout(set = 0, binding = 7, scalar) access buffer EnvironmentCdfBlock { float environment_cdf[]; }
-// G-buffer of the current stratum, one per pixel of the band.
+// G-buffer of each batch's current stratum: batch * pixel_count + pixel.
 #define SURFACES(access) layout(set = 0, binding = 8, scalar) access buffer SurfacesBlock { Surface surfaces[]; }
 // One per pixel of the band.
 #define PROBES(access) layout(set = 0, binding = 9, scalar) access buffer ProbesBlock { Probe probes[]; }

@@ -14,5 +14,5 @@ pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use image::Image;
 pub use render::{Progress, Renderer};
-pub use scene::{LoadOptions, Scene};
+pub use scene::{Environment, LoadOptions, Scene};
 pub use settings::{CameraChoice, Normalisation, Projection, Settings};

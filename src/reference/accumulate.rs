@@ -60,7 +60,7 @@ impl Contribution {
         add(&mut sums.subsurface, &mut sums.subsurface_carry, radiance);
         *batch_sum += radiance;
         sums.invalid += u32::from(self.invalid);
-        if step.first != 0 {
+        if step.count != 0 {
             sums.samples += 1;
             sums.covered += u32::from(surface.triangle != MISS);
         }

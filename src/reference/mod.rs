@@ -62,6 +62,7 @@ pub fn step(inputs: &Inputs, sample_index: u32, rows: Range<u32>, samples: Range
         sample_index,
         ray_count: inputs.rays(),
         first: 1,
+        count: 1,
         range_begin: samples.start,
         range_end: samples.end,
         point: random::point(sample_index),

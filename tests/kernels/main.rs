@@ -2,7 +2,6 @@
 //! with synchronization checks.
 
 mod shared;
-mod sphere;
 mod stages;
 mod steps;
 

@@ -1,21 +1,40 @@
 //! What Rust and GLSL share is the same on both sides: offsets in the SPIR-V, and the checked-in header.
 
 use rspirv::{
-    binary::parse_words,
-    dr::{Loader, Operand},
+    binary::{Consumer, ParseAction, parse_words},
+    dr::{Instruction, ModuleHeader, Operand},
     spirv::{Decoration, Op},
 };
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use translucent::{render::SPIRV, shared};
 
+/// All instructions in order; rspirv's own loader does not know where OpExecutionModeId belongs.
+#[derive(Default)]
+struct Instructions(Vec<Instruction>);
+
+impl Consumer for Instructions {
+    fn initialize(&mut self) -> ParseAction {
+        ParseAction::Continue
+    }
+    fn finalize(&mut self) -> ParseAction {
+        ParseAction::Continue
+    }
+    fn consume_header(&mut self, _: ModuleHeader) -> ParseAction {
+        ParseAction::Continue
+    }
+    fn consume_instruction(&mut self, instruction: Instruction) -> ParseAction {
+        self.0.push(instruction);
+        ParseAction::Continue
+    }
+}
+
 /// Struct name -> member name -> byte offset, as a module declares them.
 fn layouts(spirv: &[u8]) -> BTreeMap<String, BTreeMap<String, usize>> {
-    let mut loader = Loader::new();
-    parse_words(bytemuck::pod_collect_to_vec::<u8, u32>(spirv), &mut loader).expect("SPIR-V parses");
-    let module = loader.module();
+    let mut module = Instructions::default();
+    parse_words(bytemuck::pod_collect_to_vec::<u8, u32>(spirv), &mut module).expect("SPIR-V parses");
     let mut names: HashMap<u32, String> = HashMap::new();
     let mut members: HashMap<(u32, u32), String> = HashMap::new();
-    for instruction in &module.debug_names {
+    for instruction in &module.0 {
         match (&instruction.class.opcode, instruction.operands.as_slice()) {
             (Op::Name, [Operand::IdRef(id), Operand::LiteralString(name)]) => {
                 names.insert(*id, name.clone());
@@ -27,7 +46,7 @@ fn layouts(spirv: &[u8]) -> BTreeMap<String, BTreeMap<String, usize>> {
         }
     }
     let mut layouts: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
-    for instruction in &module.annotations {
+    for instruction in &module.0 {
         if let (
             Op::MemberDecorate,
             [

@@ -2,6 +2,7 @@
 
 use crate::{Case, assert_close};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use translucent::{
     Projection, Scene, Settings,
     reference::{self, Inputs, accumulate::accumulate, primary::primary, reflect::reflect, reproject::reproject, sample::sample},
@@ -9,12 +10,14 @@ use translucent::{
     shared::{BATCHES, Hits, MISS, Pixel, Probe, Slot, Step, Sums, Surface},
 };
 
-const SIZE: u32 = 48;
+/// The full image, and the part of it that is tested: what the animal fills.
+const FULL: (u32, u32) = (92, 92);
+const CROP: [u32; 4] = [26, 16, 66, 56];
 
 /// The shipped scene under each kind of light, with each projection.
 fn cases() -> Vec<(String, Case)> {
     let demo = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo.gltf")).expect("the shipped scene loads");
-    let constant = Environment::constant(DVec3::new(0.5, 0.7, 1.0));
+    let constant = Environment::constant(DVec3::new(0.5, 0.7, 1.0)).expect("valid");
     let texel = |i: u32| Vec3::new(0.1 + (i % 7) as f32, 0.2 + (i % 5) as f32, 0.3 + (i % 11) as f32);
     let image = Environment {
         map: translucent::scene::EnvironmentMap::Image { width: 16, height: 8, radiance: (0..128).map(texel).collect() },
@@ -30,7 +33,8 @@ fn cases() -> Vec<(String, Case)> {
                 scene.lights.truncate(1);
             }
             let settings = Settings {
-                resolution: Some((SIZE, SIZE)),
+                resolution: Some(FULL),
+                crop: Some(CROP),
                 projection,
                 directions: 2,
                 seed: 3,
@@ -52,11 +56,11 @@ struct Stages {
 }
 
 /// Samples from different batches and strata.
-const SAMPLES: [u32; 3] = [0, 37, 1003];
+const SAMPLES: [u32; 2] = [37, 1003];
 
 fn stages(inputs: &Inputs, sample_index: u32) -> Stages {
-    let step = reference::step(inputs, sample_index, 0..SIZE, 0..2048);
-    let pixels = 0..step.pixel_count;
+    let step = reference::step(inputs, sample_index, CROP[1]..CROP[3], 0..2048);
+    let pixels = (0..step.pixel_count).into_par_iter();
     let surfaces: Vec<_> = pixels.clone().map(|i| primary(inputs, &step, i)).collect();
     let probes: Vec<_> = pixels.clone().map(|i| sample(inputs, &step, i, &surfaces[i as usize])).collect();
     let hits = pixels.map(|i| reproject(inputs, &step, i, &surfaces[i as usize], &probes[i as usize])).collect();
@@ -93,6 +97,9 @@ fn primary_finds_the_twins_surface() {
         let start = (stages.step.sample_index % BATCHES * stages.step.pixel_count) as usize;
         let found = &out.get::<Surface>(Slot::Surfaces)[start..];
         for (gpu, twin) in found.iter().zip(&stages.surfaces) {
+            if gpu.triangle == MISS && twin.triangle == MISS {
+                continue;
+            }
             // An edge between two triangles may go either way; the position is the same.
             let both = (gpu.triangle == MISS) == (twin.triangle == MISS);
             errors.push(if both { error(gpu.position, twin.position, 1.0) } else { f64::INFINITY });
@@ -112,8 +119,8 @@ fn sample_draws_the_twins_probe() {
         let out = case.run("sample", &stages.step, &buffers).get::<Probe>(Slot::Probes);
         for (gpu, twin) in out.iter().zip(&stages.probes) {
             let chord = |p: &Probe| p.t_min <= p.t_max;
+            assert_eq!(chord(gpu), chord(twin));
             if !chord(twin) {
-                errors.push(if chord(gpu) { f64::INFINITY } else { 0.0 });
                 continue;
             }
             // Lengths against the probe's own size.
@@ -143,6 +150,9 @@ fn reproject_finds_the_twins_hits() {
         let out = case.run("reproject", &stages.step, &buffers).get::<Hits>(Slot::HitLists);
         for ((gpu, twin), probe) in out.iter().zip(&stages.hits).zip(&stages.probes) {
             several += usize::from(twin.count > 1);
+            if gpu.count == 0 && twin.count == 0 {
+                continue;
+            }
             if gpu.count != twin.count {
                 errors.push(f64::INFINITY);
                 continue;
@@ -178,52 +188,50 @@ fn run_sums(case: &Case, stem: &'static str, stages: &Stages) -> (Vec<Sums>, Vec
 #[test]
 fn accumulate_adds_the_twins_radiance() {
     let mut errors = vec![];
-    let mut lit = 0;
     for_each_case(|name, case, stages| {
         let (sums, batch) = run_sums(case, "accumulate", stages);
-        for (index, sums) in sums.iter().enumerate() {
+        let inputs = case.inputs();
+        let twins: Vec<_> = (0..sums.len())
+            .into_par_iter()
+            .map(|i| {
+                let (surface, probe, hits) = (&stages.surfaces[i], &stages.probes[i], &stages.hits[i]);
+                accumulate(&inputs, &stages.step, i as u32, surface, probe, hits)
+            })
+            .collect();
+        for (index, (sums, twin)) in sums.iter().zip(&twins).enumerate() {
             let surface = &stages.surfaces[index];
-            let twin = accumulate(
-                &case.inputs(),
-                &stages.step,
-                index as u32,
-                surface,
-                &stages.probes[index],
-                &stages.hits[index],
-            );
             assert_eq!((sums.samples, sums.covered), (1, u32::from(surface.triangle != MISS)), "{name}");
             assert_eq!(sums.invalid, u32::from(twin.invalid), "{name}");
             assert_eq!(batch[index], sums.subsurface, "{name}");
-            if twin.radiance == DVec3::ZERO {
-                errors.push(f64::from(sums.subsurface.length()));
+            if twin.radiance == DVec3::ZERO && sums.subsurface == Vec3::ZERO {
                 continue;
             }
-            lit += 1;
             errors.push((sums.subsurface.as_dvec3() - twin.radiance).length() / twin.radiance.length());
         }
     });
-    assert!(lit > 3000, "{lit} lit samples");
+    assert!(errors.len() > 3000, "{} lit samples", errors.len());
     assert_close("accumulate", &errors);
 }
 
 #[test]
 fn reflect_adds_the_twins_radiance() {
     let mut errors = vec![];
-    let mut lit = 0;
     for_each_case(|name, case, stages| {
         let (sums, _) = run_sums(case, "reflect", stages);
-        for (index, sums) in sums.iter().enumerate() {
-            let twin = reflect(&case.inputs(), &stages.step, index as u32, &stages.surfaces[index]);
+        let inputs = case.inputs();
+        let twins: Vec<_> = (0..sums.len())
+            .into_par_iter()
+            .map(|i| reflect(&inputs, &stages.step, i as u32, &stages.surfaces[i]))
+            .collect();
+        for (sums, twin) in sums.iter().zip(&twins) {
             assert_eq!(sums.invalid, u32::from(twin.invalid), "{name}");
-            if twin.radiance == DVec3::ZERO {
-                errors.push(f64::from(sums.reflection.length()));
+            if twin.radiance == DVec3::ZERO && sums.reflection == Vec3::ZERO {
                 continue;
             }
-            lit += 1;
             errors.push((sums.reflection.as_dvec3() - twin.radiance).length() / twin.radiance.length());
         }
     });
-    assert!(lit > 3000, "{lit} lit samples");
+    assert!(errors.len() > 3000, "{} lit samples", errors.len());
     assert_close("reflect", &errors);
 }
 
