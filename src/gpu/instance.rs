@@ -177,8 +177,7 @@ impl Instance {
     }
 
     fn candidate(&self, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-        // SAFETY, for this function: the device belongs to this instance; structures of Vulkan 1.2 and 1.3 are
-        // chained only where the device speaks that version.
+        // SAFETY: the device belongs to this instance.
         let properties = unsafe { self.raw.get_physical_device_properties(physical) };
         let version = properties.api_version;
         let mut lacks = Vec::new();
@@ -187,6 +186,7 @@ impl Instance {
         let mut id = vk::PhysicalDeviceIDProperties::default();
         if version >= vk::API_VERSION_1_2 {
             let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut id);
+            // SAFETY: the device is this instance's and knows the structures of Vulkan 1.2.
             unsafe { self.raw.get_physical_device_properties2(physical, &mut chain) };
         }
         if version >= vk::API_VERSION_1_3 {
@@ -194,6 +194,7 @@ impl Instance {
             let mut features13 = vk::PhysicalDeviceVulkan13Features::default();
             let mut chain =
                 vk::PhysicalDeviceFeatures2::default().push_next(&mut features12).push_next(&mut features13);
+            // SAFETY: the device is this instance's and knows the structures of Vulkan 1.3.
             unsafe { self.raw.get_physical_device_features2(physical, &mut chain) };
             for (has, name) in [
                 (features12.scalar_block_layout, "scalarBlockLayout"),
@@ -217,6 +218,7 @@ impl Instance {
                 lacks.push(format!("{needs} {name} (it has {has})"));
             }
         }
+        // SAFETY: the device belongs to this instance.
         let families = unsafe { self.raw.get_physical_device_queue_family_properties(physical) };
         let family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
         if family.is_none() {

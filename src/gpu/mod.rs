@@ -4,6 +4,8 @@
 //! Everything here keeps what it uses alive, so any order of dropping is right. Nothing is global: a process may
 //! open several devices.
 
+#![deny(clippy::undocumented_unsafe_blocks)]
+
 mod buffer;
 mod device;
 mod instance;

@@ -63,7 +63,7 @@ impl Recorder {
         };
         let device = &handles.device;
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(handles.family);
-        // SAFETY, for this block: the device is alive and pointers outlive the calls; dropping the recorder
+        // SAFETY: the device is alive and pointers outlive the calls; dropping the recorder
         // destroys what was made so far, null handles are ignored.
         unsafe {
             recorder.pool = device.create_command_pool(&create, None).during("create the command pool")?;

@@ -1,6 +1,6 @@
 //! `merge`: the parts of a larger render become one image.
 
-use super::{Failure, print};
+use super::{Failure, keep, print};
 use std::{path::PathBuf, process::ExitCode};
 use translucent::{
     Image,
@@ -20,6 +20,9 @@ pub struct Merge {
 impl Merge {
     pub fn run(self) -> Result<ExitCode, Failure> {
         check_writable(&self.output)?;
+        for part in &self.parts {
+            keep(part, &self.output)?;
+        }
         let mut parts = Vec::new();
         for file in self.parts {
             let image = Image::read(&file).map_err(Failure::while_reading)?;

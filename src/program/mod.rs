@@ -8,6 +8,7 @@ pub mod tables;
 use std::{
     fmt::Display,
     io::{self, Write},
+    path::Path,
     process::ExitCode,
 };
 use translucent::Error;
@@ -37,6 +38,16 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Failure {
         let code = if error.is_input() { 2 } else { 1 };
         Failure { message: error.to_string(), code: ExitCode::from(code) }
+    }
+}
+
+/// Refuses to write over a file that is read.
+pub fn keep(input: &Path, output: &Path) -> Result<(), Failure> {
+    match (input.canonicalize(), output.canonicalize()) {
+        (Ok(read), Ok(written)) if read == written => {
+            Err(Failure::input(format!("{}: is an input, and would be overwritten", output.display())))
+        }
+        _ => Ok(()),
     }
 }
 

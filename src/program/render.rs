@@ -1,6 +1,6 @@
 //! `render`: a glTF scene becomes an EXR image, and a PNG where one is asked for.
 
-use super::{Failure, INTERRUPTED, arguments, arguments::EnvironmentSource, print};
+use super::{Failure, INTERRUPTED, arguments, arguments::EnvironmentSource, keep, print};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -65,7 +65,7 @@ pub struct Render {
           value_parser = arguments::finite)]
     environment_rotation: Option<f64>,
     /// Factor on the environment's radiance.
-    #[arg(long, value_name = "S", requires = "environment", value_parser = arguments::not_negative)]
+    #[arg(long, value_name = "S", requires = "environment", allow_negative_numbers = true, value_parser = arguments::not_negative)]
     environment_scale: Option<f64>,
     /// Show the environment where no surface is.
     #[arg(long)]
@@ -91,7 +91,7 @@ pub struct Render {
     #[arg(long, value_name = "EV", requires = "png", allow_negative_numbers = true, value_parser = arguments::finite)]
     exposure: Option<f64>,
     /// Key of all random numbers.
-    #[arg(long, value_name = "S", default_value_t = 0)]
+    #[arg(long, value_name = "S", default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
     /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
     #[arg(long, value_name = "INDEX|NAME|UUID")]
@@ -166,6 +166,9 @@ impl Render {
                 return Err(Failure::input(format!("{}: its name must end in .{extension}", path.display())));
             }
             check_writable(path)?;
+            if let Some(EnvironmentSource::File(environment)) = &self.environment {
+                keep(environment, path)?;
+            }
         }
         Ok(output)
     }
@@ -240,9 +243,9 @@ impl Render {
 fn show(bar: &ProgressBar, done: u64, total: u64, samples: &Range<u32>, start: Instant) {
     let rate = done as f64 / start.elapsed().as_secs_f64().max(1e-9) * 1e-6;
     let each = done as f64 / total.max(1) as f64 * samples.len() as f64;
+    bar.set_message(format!("{each:.0}/{} samples  {rate:.3} Msamples/s", samples.len()));
     bar.set_length(total);
     bar.set_position(done);
-    bar.set_message(format!("{each:.0}/{} samples  {rate:.3} Msamples/s", samples.len()));
 }
 
 /// A flag that the first Ctrl-C sets; the second ends the program at once.

@@ -1,0 +1,70 @@
+//! Ctrl-C: the first writes what there is, the second ends the program.
+#![cfg(unix)]
+
+use crate::{Folder, integer, stderr};
+use std::{
+    process::{Child, Command, Output, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+/// More samples than any machine renders during the test.
+const ENDLESS: &str = "--samples 2000000000 -o out.exr --quiet";
+
+fn start(folder: &Folder, words: &str) -> Child {
+    let mut command = folder.command(words);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
+    // Ctrl-C is handled from the start on; a while later it is loading or rendering.
+    sleep(Duration::from_millis(1500));
+    child
+}
+
+fn interrupt(child: &Child) {
+    let status = Command::new("sh").arg("-c").arg(format!("kill -INT {}", child.id())).status();
+    assert!(status.expect("there is a shell").success());
+}
+
+/// What it left when it ended, at most a minute later.
+fn end(mut child: Child) -> Output {
+    let start = Instant::now();
+    while child.try_wait().expect("it is our child").is_none() {
+        if start.elapsed() > Duration::from_secs(60) {
+            child.kill().expect("it is our child");
+            panic!("the program ignores Ctrl-C");
+        }
+        sleep(Duration::from_millis(20));
+    }
+    child.wait_with_output().expect("it has ended")
+}
+
+#[test]
+fn the_first_writes_a_whole_image_of_the_samples_so_far() {
+    let folder = Folder::new("interrupt");
+    let child = start(&folder, &format!("render SPOT --resolution 24x24 {ENDLESS}"));
+    interrupt(&child);
+    let output = end(child);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert_eq!(folder.files(), ["out.exr"]);
+    let image = folder.image("out.exr");
+    let samples = integer(&image, "samples");
+    assert!(samples >= 1);
+    assert_eq!((integer(&image, "sampleBegin"), integer(&image, "sampleEnd")), (0, samples));
+    assert!(image.channel("samples.Y").expect("contract").iter().all(|&n| n == samples as f32));
+
+    // The same samples without an interruption are the same image.
+    folder.done(&format!("render SPOT --resolution 24x24 --samples {samples} -o again.exr"));
+    assert!(image == folder.image("again.exr"));
+}
+
+#[test]
+fn the_second_ends_the_program_without_a_file() {
+    let folder = Folder::new("abort");
+    // A single sample of so many pixels takes software Vulkan seconds, and a GPU cannot finish either.
+    let child = start(&folder, &format!("render SPOT --resolution 4096x4096 --directions 1000 {ENDLESS}"));
+    interrupt(&child);
+    sleep(Duration::from_millis(200));
+    interrupt(&child);
+    let output = end(child);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert_eq!(folder.files(), [] as [&str; 0]);
+}

@@ -1,0 +1,124 @@
+//! Wrong usage and wrong input: exit status 2, a message that names what is wrong, and no file.
+
+use crate::{Folder, stderr};
+use std::fs;
+
+#[test]
+fn wrong_usage_and_input_end_with_2_and_a_message_and_leave_nothing() {
+    let folder = Folder::new("usage");
+    fs::create_dir(folder.join("taken.exr")).expect("writable");
+    fs::write(folder.join("garbage.glb"), b"glTF, but not really").expect("writable");
+    fs::write(folder.join("empty.gltf"), b"{}").expect("writable");
+    fs::write(folder.join("text.hdr"), b"no image").expect("writable");
+    fs::write(folder.join("light.exr"), b"an environment").expect("writable");
+    let before = folder.files();
+    for (words, expected) in [
+        ("", "Usage"),
+        ("bake SPOT", "bake"),
+        ("render", "SCENE"),
+        ("render SPOT --error 1%", "--error"),
+        ("render SPOT --reproject screen", "screen"),
+        ("render SPOT --projection sideways", "sideways"),
+        ("render SPOT --model burley", "burley"),
+        ("render missing.glb", "missing.glb"),
+        ("render garbage.glb", "garbage.glb"),
+        ("render empty.gltf", "empty.gltf"),
+        ("render taken.exr", "taken.exr"),
+        ("render SPOT --resolution 0x5", "--resolution"),
+        ("render SPOT --resolution 5", "--resolution"),
+        ("render SPOT --resolution 100000x5", "100000"),
+        ("render SPOT --samples 0", "--samples"),
+        ("render SPOT --samples 8:8", "--samples"),
+        ("render SPOT --samples 9:3", "--samples"),
+        ("render SPOT --samples 3000000000", "--samples"),
+        ("render SPOT --directions 0", "--directions"),
+        ("render SPOT --camera nobody", "nobody"),
+        ("render SPOT --camera 7", "7"),
+        ("render SPOT --crop 0,0,0,4", "--crop"),
+        ("render SPOT --resolution 32x32 --crop 0,0,64,4", "crop"),
+        ("render SPOT --aov beauty", "beauty"),
+        ("render SPOT --material wax", "NAME=PRESET"),
+        ("render SPOT --material nowhere=skin1", "nowhere"),
+        ("render SPOT --material wax=granite", "granite"),
+        ("render SPOT --unit furlong", "furlong"),
+        ("render SPOT --unit 0mm", "unit"),
+        ("render SPOT --environment missing.hdr", "missing.hdr"),
+        ("render SPOT --environment text.hdr", "text.hdr"),
+        ("render SPOT --environment constant:1,1", "constant:R,G,B"),
+        ("render SPOT --environment constant:1,1,-1", "constant:R,G,B"),
+        ("render SPOT --environment constant:1,1,1 --environment-scale -1", "--environment-scale"),
+        ("render SPOT --environment light.exr -o light.exr", "overwritten"),
+        ("render SPOT --environment-rotation 90", "--environment"),
+        ("render SPOT --exposure 1", "--png"),
+        ("render SPOT --seed -1", "--seed"),
+        ("render SPOT --device nonesuch", "nonesuch"),
+        ("render SPOT -o nowhere/out.exr", "nowhere"),
+        ("render SPOT -o taken.exr", "taken.exr"),
+        ("render SPOT -o out.jpg", "out.jpg"),
+        ("render SPOT --png nowhere/out.png", "nowhere"),
+        ("render SPOT --png out.exr", "out.exr"),
+        ("merge -o out.exr", "PART"),
+        ("merge missing.exr -o out.exr", "missing.exr"),
+        ("merge garbage.glb -o out.exr", "garbage.glb"),
+        ("merge garbage.glb -o nowhere/out.exr", "nowhere"),
+    ] {
+        let output = folder.run(words);
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{words}: {message}");
+        assert!(message.contains(expected), "{words}: {message}");
+        assert!(!message.contains("panicked"), "{words}: {message}");
+        assert!(output.stdout.is_empty(), "{words}");
+        assert_eq!(folder.files(), before, "{words}");
+    }
+}
+
+#[test]
+fn the_help_names_every_option_that_is_built_and_no_other() {
+    let help = Folder::new("help").done("render --help");
+    let mut options: Vec<&str> =
+        help.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-')).filter(|word| word.starts_with("--")).collect();
+    options.sort();
+    options.dedup();
+    assert_eq!(
+        options,
+        [
+            "--aov",
+            "--camera",
+            "--crop",
+            "--device",
+            "--directions",
+            "--environment",
+            "--environment-rotation",
+            "--environment-scale",
+            "--exposure",
+            "--help",
+            "--material",
+            "--model",
+            "--normalisation",
+            "--output",
+            "--png",
+            "--projection",
+            "--quiet",
+            "--reproject",
+            "--resolution",
+            "--samples",
+            "--seed",
+            "--show-environment",
+            "--unit",
+        ]
+    );
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let folder = Folder::new("pipe");
+    let mut child = folder
+        .command("presets")
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!((output.status.code(), stderr(&output)), (Some(0), String::new()));
+}
