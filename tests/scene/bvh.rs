@@ -46,7 +46,7 @@ impl Node {
 }
 
 /// Visits all leaves; returns how often each triangle was met, and the depth.
-fn check(scene: &Scene) -> usize {
+pub fn check(scene: &Scene) -> usize {
     let mut met = vec![0; scene.triangles.len()];
     let mut deepest = 0;
     // Node, level, and the boxes on the way to it, all of which must hold its triangles.
