@@ -59,6 +59,9 @@ fn files() {
         let message = Environment::load(directory.0.join(path)).expect_err("no such file").to_string();
         assert!(message.contains(path), "{message}");
     }
+    let huge = directory.0.join("huge.hdr");
+    std::fs::write(&huge, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n").expect("a temporary file");
+    assert!(Environment::load(&huge).is_err(), "a header alone takes no memory");
     // Broken contents are errors, whatever is broken.
     let mut numbers = Numbers(3);
     for path in [&hdr, &exr] {

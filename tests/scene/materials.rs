@@ -290,6 +290,10 @@ fn warnings_name_what_is_left_out() {
         (json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}), "refraction through clear"),
         (json!({"extensions": {"KHR_materials_clearcoat": {}}}), "clear coat (KHR_materials_clearcoat)"),
         (json!({"extras": {"bssrdf": {"preset": "skin1", "model": "burley"}}}), "the burley model is not built yet"),
+        (
+            json!({"extras": {"bssrdf": {"preset": "ketchup"}}}),
+            "preset ketchup absorbs more than it scatters in green, blue",
+        ),
         (json!({"extras": {"bssrdf": {"sigma_s_prime": 0, "sigma_a": 1, "unit": "1/m"}}}), "scatters nothing"),
     ];
     for (json, wanted) in table {
