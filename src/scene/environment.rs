@@ -5,6 +5,9 @@ use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 
+/// Most texels of an image (16384 x 16384): a broken header must not ask for all memory.
+const TEXELS_MAX: usize = 1 << 28;
+
 impl Environment {
     /// The same radiance from everywhere.
     ///
@@ -80,6 +83,9 @@ fn first_wrong(radiance: &[Vec3]) -> Option<(usize, String)> {
 fn read_hdr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
     let mut reader = image::ImageReader::open(path).map_err(|error| Error::file(path, error))?;
     reader.set_format(image::ImageFormat::Hdr);
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some((TEXELS_MAX * size_of::<Vec3>()) as u64);
+    reader.limits(limits);
     let image = reader.decode().map_err(|error| Error::file(path, error))?.into_rgb32f();
     let (width, height) = image.dimensions();
     Ok((width, height, image.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect()))
@@ -88,13 +94,22 @@ fn read_hdr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
 fn read_exr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
     let image = exr::prelude::read_first_rgba_layer_from_file(
         path,
-        |size, _| (size.width(), vec![Vec3::ZERO; size.area()]),
+        |size, _| {
+            let count = size.width().checked_mul(size.height()).filter(|&count| count <= TEXELS_MAX);
+            (size.width(), vec![Vec3::ZERO; count.unwrap_or(0)])
+        },
         |(width, texels), position, (r, g, b, _): (f32, f32, f32, f32)| {
-            texels[position.y() * *width + position.x()] = Vec3::new(r, g, b);
+            if let Some(texel) = texels.get_mut(position.y() * *width + position.x()) {
+                *texel = Vec3::new(r, g, b);
+            }
         },
     )
     .map_err(|error| Error::file(path, error))?;
     let size = image.layer_data.size;
     let (_, texels) = image.layer_data.channel_data.pixels;
+    if texels.is_empty() {
+        let (width, height) = (size.width(), size.height());
+        return Err(Error::file(path, format!("is {width} x {height}; {TEXELS_MAX} texels at most")));
+    }
     Ok((size.width() as u32, size.height() as u32, texels))
 }

@@ -56,7 +56,7 @@ pub(super) fn internal(
         let corner = ((triangle.corner - frame.centre) * frame.scale).as_vec3();
         let edge1 = (triangle.edge1 * frame.scale).as_vec3();
         let edge2 = (triangle.edge2 * frame.scale).as_vec3();
-        if !(edge1.as_dvec3().cross(edge2.as_dvec3()).length() > AREA_MIN) {
+        if edge1.as_dvec3().cross(edge2.as_dvec3()).length() <= AREA_MIN {
             dropped += 1;
             continue;
         }

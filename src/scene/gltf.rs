@@ -10,7 +10,6 @@ use super::{Camera, Lens, Light, LightKind, LoadOptions, Material, Set, material
 use crate::{Error, Result};
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
-use std::borrow::Cow;
 use std::path::Path;
 
 /// What a file holds, in metres.
@@ -61,7 +60,7 @@ const COORDINATE_MAX: f64 = 1e30;
 /// Reads a whole file that lies (or would lie) at `file`.
 pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Raw> {
     let (json, binary) = split(file, bytes)?;
-    let value: Value = serde_json::from_slice(&json)
+    let value: Value = serde_json::from_slice(json)
         .map_err(|error| Error::scene(file, "glTF", format!("is not valid JSON: {error}")))?;
     let root = Item::root(file, &value);
     let mut warnings = Vec::new();
@@ -119,14 +118,14 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
 }
 
 /// The JSON text and the binary chunk of a GLB container, or the whole file as JSON.
-fn split<'a>(file: &Path, bytes: &'a [u8]) -> Result<(Cow<'a, [u8]>, Option<&'a [u8]>)> {
+fn split<'a>(file: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let error = |problem: String| Error::scene(file, "GLB container", problem);
     let word = |at: usize| -> Option<u32> {
         let word = bytes.get(at..at.checked_add(4)?)?;
         Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
     };
     if !bytes.starts_with(b"glTF") {
-        return Ok((Cow::Borrowed(bytes), None));
+        return Ok((bytes, None));
     }
     match word(4) {
         Some(2) => {}
@@ -153,7 +152,7 @@ fn split<'a>(file: &Path, bytes: &'a [u8]) -> Result<(Cow<'a, [u8]>, Option<&'a 
         at += 8 + chunk.len().next_multiple_of(4);
     }
     let json = json.ok_or_else(|| error("has no JSON chunk".into()))?;
-    Ok((Cow::Borrowed(json), binary))
+    Ok((json, binary))
 }
 
 /// Version and extensions.
@@ -182,10 +181,8 @@ fn check_asset(root: &Item, warnings: &mut Vec<String>) -> Result<()> {
             warnings.push(used.note(format!("the extension {} is not modelled", shorten(name))));
         }
     }
-    for (list, problem) in [("animations", "are not modelled; the scene is shown as it rests")] {
-        if !root.list(list)?.is_empty() {
-            warnings.push(format!("{list} {problem}"));
-        }
+    if !root.list("animations")?.is_empty() {
+        warnings.push("animations are not modelled; the scene is shown as it rests".into());
     }
     Ok(())
 }

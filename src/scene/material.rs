@@ -19,6 +19,9 @@ const DARKEST_ATTENUATION: f64 = 1e-4;
 const COEFFICIENT_MAX: f64 = 1e12;
 const LENGTH_RANGE: (f64, f64) = (1e-12, 1e12);
 
+/// Reduced albedo below which diffusion theory is far from the truth.
+const DIFFUSION_ALBEDO_MIN: f64 = 0.5;
+
 /// Members of `extras.bssrdf`.
 const BSSRDF_KEYS: &[&str] = &[
     "preset",
@@ -98,6 +101,9 @@ pub(super) fn read(
         material.medium = read_scattering(item, &scatter, Mapping::VolumeScatter, warnings)?;
     } else {
         warn_of_clear_matter(item, warnings)?;
+    }
+    if let Some(medium) = &material.medium {
+        warn_of_absorption(item, medium, warnings);
     }
     Ok(material)
 }
@@ -252,13 +258,25 @@ fn read_bssrdf(
             }
         }
     }
-    warn_if_clear(item, material.medium.as_ref(), warnings);
     Ok(())
 }
 
-fn warn_if_clear(item: &Item, medium: Option<&Medium>, warnings: &mut Vec<String>) {
-    if medium.is_some_and(|medium| medium.sigma_s_prime == DVec3::ZERO) {
+/// Says where a medium scatters too little for the model.
+fn warn_of_absorption(item: &Item, medium: &Medium, warnings: &mut Vec<String>) {
+    if medium.sigma_s_prime == DVec3::ZERO {
         warnings.push(item.note("scatters nothing, so no light comes back out of it"));
+        return;
+    }
+    let absorbing = (0..3).filter(|&channel| {
+        let (scattering, absorption) = (medium.sigma_s_prime[channel], medium.sigma_a[channel]);
+        scattering > 0.0 && scattering < DIFFUSION_ALBEDO_MIN * (scattering + absorption)
+    });
+    let names: Vec<&str> = absorbing.map(|channel| ["red", "green", "blue"][channel]).collect();
+    if !names.is_empty() {
+        let (names, source) = (names.join(", "), &medium.source);
+        warnings.push(
+            item.note(format!("{source} absorbs more than it scatters in {names}: diffusion theory is rough there")),
+        );
     }
 }
 
@@ -369,9 +387,7 @@ fn read_scattering(
     warn_of_share(material, item, warnings)?;
     let (sigma_s_prime, sigma_a) =
         medium::channels(|channel| Ok(mapping.coefficients(sigma_t[channel], rho[channel], g[channel])))?;
-    let medium = Medium { sigma_s_prime, sigma_a, g, source: name.into() };
-    warn_if_clear(item, Some(&medium), warnings);
-    Ok(Some(medium))
+    Ok(Some(Medium { sigma_s_prime, sigma_a, g, source: name.into() }))
 }
 
 /// sigma_t = -ln(attenuationColor) / attenuationDistance [1/m]; 0 without KHR_materials_volume.

@@ -115,9 +115,8 @@ impl<'r, 'a> Meshes<'r, 'a> {
             let [a, b, c] = order.map(|corner| primitive.positions[corner]);
             let corner = linear * a + translation;
             let (edge1, edge2) = (linear * (b - a), linear * (c - a));
-            let largest = corner.abs().max(edge1.abs()).max(edge2.abs()).max_element();
-            // A sum with NaN or infinity is not below the limit either.
-            if !(largest < COORDINATE_MAX) {
+            let inside = |vector: DVec3| vector.is_finite() && vector.abs().max_element() < COORDINATE_MAX;
+            if !(inside(corner) && inside(edge1) && inside(edge2)) {
                 let problem = format!("{} places a vertex beyond {COORDINATE_MAX} m", instance.node.path);
                 return Err(primitive.item.error(problem));
             }

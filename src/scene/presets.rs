@@ -97,6 +97,7 @@ const JENSEN_TABLE: &[(&str, [f64; 3], [f64; 3], f64)] = &[
 
 /// Name, scattering (not reduced), absorption [1/mm], mean cosine.
 #[rustfmt::skip]
+#[allow(clippy::type_complexity)]
 const NARASIMHAN_TABLE: &[(&str, [f64; 3], [f64; 3], [f64; 3])] = &[
     ("lowfat_milk", [13.1157, 15.4445, 17.9572], [0.00287, 0.00575, 0.01150], [0.932, 0.902, 0.859]),
     ("reduced_milk", [13.7335, 15.6003, 17.8007], [0.00256, 0.00511, 0.01278], [0.819, 0.797, 0.746]),

@@ -126,7 +126,7 @@ pub fn same_triangles(a: &[[DVec3; 3]], b: &[[DVec3; 3]], tolerance: f64) -> boo
     a.len() == b.len() && a.iter().all(|x| b.iter().filter(|y| close(x, y)).count() == 1)
 }
 
-/// Twice the volume-like sum of a closed surface: positive if its triangles are wound outward.
+/// The volume that a closed surface bounds: positive if its triangles are wound outward.
 pub fn volume(triangles: &[[DVec3; 3]]) -> f64 {
     triangles.iter().map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0).sum()
 }
@@ -151,4 +151,23 @@ impl Numbers {
     pub fn signed(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
+}
+
+/// The JSON and the binary chunk of the shipped scene.
+pub fn spot() -> (Value, Vec<u8>) {
+    let bytes = std::fs::read("assets/spot.glb").expect("the shipped scene is there");
+    let length = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize;
+    let json = serde_json::from_slice(&bytes[20..20 + length(12)]).expect("the shipped scene is valid");
+    (json, bytes[28 + length(12)..].to_vec())
+}
+
+/// A GLB container.
+pub fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
+    let chunk = |kind: &[u8; 4], contents: &[u8], padding: u8| {
+        let mut contents = contents.to_vec();
+        contents.resize(contents.len().next_multiple_of(4), padding);
+        [&(contents.len() as u32).to_le_bytes()[..], kind, &contents].concat()
+    };
+    let chunks = [chunk(b"JSON", json.to_string().as_bytes(), b' '), chunk(b"BIN\0", binary, 0)].concat();
+    [b"glTF", &2u32.to_le_bytes()[..], &(chunks.len() as u32 + 12).to_le_bytes(), &chunks].concat()
 }

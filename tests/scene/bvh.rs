@@ -36,7 +36,7 @@ fn decode(scene: &Scene, index: u32) -> Node {
 }
 
 impl Node {
-    fn boxed(&self, child: usize) -> (DVec3, DVec3) {
+    fn boxed(&self, child: usize) -> Box {
         let at = |planes: &[[u8; 8]; 3]| {
             self.origin
                 + self.step * DVec3::new(planes[0][child] as f64, planes[1][child] as f64, planes[2][child] as f64)
@@ -45,12 +45,15 @@ impl Node {
     }
 }
 
-/// Visits all leaves; returns how often each triangle was met, and the depth.
-fn check(scene: &Scene) -> usize {
+/// The lowest and the highest corner of a box.
+type Box = (DVec3, DVec3);
+
+/// Visits all leaves and checks what they hold; returns the depth.
+pub fn check(scene: &Scene) -> usize {
     let mut met = vec![0; scene.triangles.len()];
     let mut deepest = 0;
     // Node, level, and the boxes on the way to it, all of which must hold its triangles.
-    let mut waiting: Vec<(u32, usize, Vec<(DVec3, DVec3)>)> = vec![(0, 1, Vec::new())];
+    let mut waiting: Vec<(u32, usize, Vec<Box>)> = vec![(0, 1, Vec::new())];
     let mut visited = 0;
     while let Some((index, level, boxes)) = waiting.pop() {
         visited += 1;

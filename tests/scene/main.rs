@@ -2,3 +2,10 @@
 
 mod build;
 mod bvh;
+mod environments;
+mod geometry;
+mod materials;
+mod mutations;
+mod nodes;
+mod presets;
+mod rules;
