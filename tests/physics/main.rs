@@ -5,3 +5,4 @@ mod common;
 mod plane;
 mod profile;
 mod random;
+mod sphere;
