@@ -6,7 +6,8 @@ use glam::DVec3;
 ///
 /// T. Duff et al., "Building an orthonormal basis, revisited", JCGT 6 (2017), listing 3.
 pub fn basis(n: DVec3) -> (DVec3, DVec3) {
-    let sign = 1f64.copysign(n.z);
+    // Not the sign bit: of a zero, it depends on how a cross product was rounded.
+    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
     (DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y))

@@ -265,7 +265,6 @@ fn rays_may_be_dispatched_in_parts() {
 #[test]
 fn what_is_not_finite_is_counted_and_left_out() {
     let mut world = still_life(PROJECTION_MIS, 4, 4);
-    world.lights[0].intensity = vec3(f32::MAX, 1.0, 1.0);
     world.light(Light {
         intensity: vec3(f32::INFINITY, 0.0, 0.0),
         position: vec3(0.0, 0.0, 9.0),
