@@ -6,7 +6,7 @@ use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 use translucent::Normalisation::Energy;
 use translucent::reference::accumulate::{accumulate, choose};
-use translucent::reference::boundary::transmittance;
+use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
 use translucent::reference::profile::Dipole;
 use translucent::reference::projection::seen;
 use translucent::reference::random::hash;
@@ -252,6 +252,42 @@ fn mixture_tames_the_tail() {
     let fractions = translucent::reference::projection::fractions(PROJECTION_MIS, seen.normal.dot(seen.wo));
     let planar = Dipole::new(coefficients(5.0, ALBEDO).0, coefficients(5.0, ALBEDO).1, IOR).total();
     // Two hits on a sphere at most; one direction of constant light varies by Ft / (1 - rho_e).
-    let light = transmittance(IOR, 1.0) / (1.0 - 0.0611318252);
+    let light = transmittance(IOR, 1.0) / (1.0 - diffuse_reflectance(IOR, Side::Outside));
     assert!(largest <= 2.0 * planar * light / fractions[1], "{largest} for a mean of {}", flat(5.0));
+}
+
+#[test]
+fn what_entered_leaves() {
+    // Under any light the flux out of a sphere is the profile's mass within 2R times the flux that entered; for a lamp
+    // at infinity that is pi R^2 (1 - rho_e) E. Points uniform over the sphere, each seen along its normal.
+    let leaving = std::f64::consts::PI * (1.0 - diffuse_reflectance(IOR, Side::Outside));
+    for sigma_tr in [0.5, 5.0, 30.0] {
+        let group = |group: u32| {
+            let value = |point: u32| {
+                let random = |k: u32| f64::from(hash(hash(group * 64 + point) ^ k)) / 2f64.powi(32);
+                let (z, phi) = (2.0 * random(1) - 1.0, std::f64::consts::TAU * random(2));
+                let mut ball = Ball::new(
+                    matter(sigma_tr, ALBEDO, IOR, Energy),
+                    PROJECTION_MIS,
+                    64,
+                    Eye::Infinite,
+                    z.acos().to_degrees(),
+                );
+                ball.world.look(3.0 * ball.position, ball.position, 1e-3);
+                ball.world.features.environment = ENVIRONMENT_NONE;
+                ball.world.view.seed = group;
+                ball.world.light(sun(dvec3(phi.cos(), phi.sin(), 0.7), 1.0));
+                let mut world = ball.world.clone();
+                let inputs = ball.world.inputs();
+                let sum: DVec3 = (0..16).map(|s| ball.value(&step(&inputs, s, 0..1, 0..16), point, &mut world)).sum();
+                // Lo / Ft(wo) times int Ft cos dw is the exitance.
+                sum / 16.0 * leaving * 4.0 * std::f64::consts::PI
+            };
+            (0..64).map(value).sum::<DVec3>() / 64.0
+        };
+        let groups: Vec<DVec3> = (0..128).into_par_iter().map(group).collect();
+        let found = Estimate::of(&groups);
+        found.check(flat(sigma_tr) * leaving, 1e-5, &format!("sigma_tr R {sigma_tr}"));
+        assert!(found.error.x < 0.02 * found.mean.x, "{found:?}");
+    }
 }
