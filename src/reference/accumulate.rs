@@ -54,7 +54,8 @@ impl Contribution {
         Contribution { radiance: if valid { radiance } else { DVec3::ZERO }, invalid: !valid }
     }
 
-    /// Adds to the sums of a pixel as `accumulate.comp` does. `batch_sum` is the one of the sample's batch.
+    /// Adds to the sums of a pixel as `accumulate.comp` does. `batch_sum` is the one of the sample's batch; where the
+    /// kernel keeps none, a caller's to forget.
     pub fn add_subsurface(&self, step: &Step, surface: &Surface, sums: &mut Sums, batch_sum: &mut Vec3) {
         let radiance = self.radiance.as_vec3();
         add(&mut sums.subsurface, &mut sums.subsurface_carry, radiance);

@@ -6,12 +6,23 @@
 //! H. W. Jensen et al., SIGGRAPH 2001, and with the moments of Fresnel's equations by quadrature.
 
 use crate::settings::Normalisation;
+use crate::shared::Triangle;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Three vertices, counter-clockwise seen from outside.
 pub type Corners = [DVec3; 3];
+
+/// The triangles of one set, and all others.
+pub fn corners(triangles: &[Triangle], set: u32) -> (Vec<Corners>, Vec<Corners>) {
+    let corners = |t: &&Triangle| {
+        let (corner, edge1, edge2) = (t.corner.as_dvec3(), t.edge1.as_dvec3(), t.edge2.as_dvec3());
+        [corner, corner + edge1, corner + edge2]
+    };
+    let (own, others): (Vec<&Triangle>, Vec<&Triangle>) = triangles.iter().partition(|t| t.set == set);
+    (own.iter().map(corners).collect(), others.iter().map(corners).collect())
+}
 
 /// Homogeneous matter; coefficients in 1/length of the geometry.
 #[derive(Clone, Copy, Debug)]

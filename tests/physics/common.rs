@@ -1,6 +1,6 @@
 //! Scenes for the twins, and means with their standard errors.
 
-use glam::{DVec3, Mat3, Vec3, vec3};
+use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 use translucent::Normalisation;
 use translucent::reference::accumulate::{Contribution, accumulate};
@@ -242,9 +242,4 @@ pub fn plane(material: Material, projection: u32, pixels: u32, angle: f64, persp
     let surface = world.surface(0, ON_PLANE);
     assert!(surface.barycentric.min_element() > 0.0 && surface.barycentric.element_sum() < 1.0);
     (world, surface)
-}
-
-/// All three channels.
-pub fn grey(x: f32) -> Vec3 {
-    vec3(x, x, x)
 }

@@ -2,6 +2,11 @@
 
 mod boundary;
 mod common;
+mod density;
+mod edge;
+mod light;
 mod plane;
 mod profile;
 mod random;
+mod sphere;
+mod stages;

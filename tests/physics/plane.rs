@@ -84,3 +84,65 @@ fn uniform_light_leaves_alike_in_all_directions() {
         }
     }
 }
+
+/// What a plane with the interpolated normal `shading` shows under a lamp at `wi`, over E Rd / (pi (1 - rho_e)).
+fn shaded(shading: DVec3, wo_angle: f64, wi: DVec3) -> f64 {
+    let (mut world, surface) = plane(matter(1.0, 0.95, 1.3, Energy), PROJECTION_MIS, 64, wo_angle, false);
+    for s in &mut world.shadings {
+        (s.normal0, s.normal1, s.normal2) = (shading.as_vec3(), shading.as_vec3(), shading.as_vec3());
+    }
+    world.features.environment = ENVIRONMENT_NONE;
+    world.light(sun(-wi, 1.0));
+    let inputs = world.inputs();
+    let found = estimate(&world, 256, |index, step| subsurface(&inputs, step, index, &surface));
+    let (sigma_s, sigma_a) = coefficients(1.0, 0.95);
+    let total = translucent::reference::profile::Dipole::new(sigma_s, sigma_a, 1.3).total();
+    let scale = total / (std::f64::consts::PI * (1.0 - diffuse_reflectance(1.3, Side::Outside)));
+    assert!(found.error.x <= 2e-3 * found.mean.x, "{found:?}");
+    found.mean.x / scale
+}
+
+#[test]
+fn interpolated_normals_are_in_fresnel_and_cosines_alone() {
+    let shading = DVec3::new(0.5, 0.1, 1.0).normalize();
+    let toward = |x: f64, z: f64| DVec3::new(x, 0.0, z).normalize();
+    let entering = |n: DVec3, wi: DVec3| transmittance(1.3, n.dot(wi)) * n.dot(wi);
+    let close = |found: f64, expected: f64, what: &str| {
+        assert!((found - expected).abs() <= 0.01 * expected, "{what}: {found} for {expected}");
+    };
+    let wi = toward(-0.4, 1.0);
+    let wo = |angle: f64| DVec3::new(angle.sin(), 0.0, angle.cos());
+    let leaving = |n: DVec3, angle: f64| transmittance(1.3, n.dot(wo(angle)));
+    close(shaded(shading, 0.4, wi), leaving(shading, 0.4) * entering(shading, wi), "tilted");
+    // Below the geometric horizon, and above it but below the interpolated one.
+    assert_eq!(shaded(shading, 0.4, toward(1.0, -0.05)), 0.0);
+    assert_eq!(shaded(shading, 0.4, toward(-1.0, 0.2)), 0.0);
+    // Seen from where the interpolated normal faces away, the exit uses the geometric one.
+    close(shaded(shading, -1.4, wi), leaving(DVec3::Z, -1.4) * entering(shading, wi), "seen from behind");
+}
+
+#[test]
+fn interpolated_normals_are_those_of_the_hit() {
+    // Matter with a mean free path of 1e-3 is lit where it is seen: the irradiance there follows the three normals.
+    let (sigma_s, sigma_a) = coefficients(2e3, 0.95);
+    let dense = material(DVec3::splat(sigma_s), DVec3::splat(sigma_a), 1.0, Energy, 1e-6);
+    let mut world = World::new(dense, PROJECTION_MIS, 64);
+    world.features.environment = ENVIRONMENT_NONE;
+    world.triangle([DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0]);
+    let normals = [(0.0, 0.0), (0.6, 0.0), (0.0, -0.5)].map(|(x, y)| DVec3::new(x, y, 1.0).normalize());
+    let s = &mut world.shadings[0];
+    (s.normal0, s.normal1, s.normal2) = (normals[0].as_vec3(), normals[1].as_vec3(), normals[2].as_vec3());
+    let wi = DVec3::new(0.5, -0.3, 1.0).normalize();
+    world.light(sun(-wi, 1.0));
+    let total = translucent::reference::profile::Dipole::new(sigma_s, sigma_a, 1.0).total();
+    for weights in [[0.2, 0.5, 0.3], [0.6, 0.1, 0.3]] {
+        let at = DVec3::new(4.0 * weights[1], 4.0 * weights[2], 0.0);
+        world.look(at + 3.0 * DVec3::Z, at, 1e-4);
+        let surface = world.surface(0, at);
+        let inputs = world.inputs();
+        let found = estimate(&world, 128, |index, step| subsurface(&inputs, step, index, &surface));
+        let normal = (0..3).map(|k| normals[k] * weights[k]).sum::<DVec3>().normalize();
+        found.check(normal.dot(wi) * total / std::f64::consts::PI, 1e-3, "interpolated");
+        assert!(found.error.x < 5e-3 * found.mean.x);
+    }
+}
