@@ -31,10 +31,7 @@ const PADDING: f32 = 1.0 / (1 << 20) as f32;
 /// No triangle is split, so each is in exactly one leaf.
 pub(super) fn build(file: &Path, triangles: &[shared::Triangle]) -> Result<(Vec<UVec4>, Vec<u32>)> {
     let boxes: Vec<Aabb> = triangles.iter().map(bounds).collect();
-    let mut wide = bvh2_to_cwbvh(&binary(&boxes, COSTED_LEVELS), LEAF_TRIANGLES, true, false);
-    if depth(&wide) > MAX_DEPTH {
-        wide = bvh2_to_cwbvh(&binary(&boxes, 0), LEAF_TRIANGLES, true, false);
-    }
+    let wide = bvh2_to_cwbvh(&binary(&boxes), LEAF_TRIANGLES, true, false);
     let depth = depth(&wide);
     if depth > MAX_DEPTH {
         return Err(Error::scene(file, "scene", format!("its BVH is {depth} levels deep; {MAX_DEPTH} at most")));
@@ -52,9 +49,9 @@ fn bounds(triangle: &shared::Triangle) -> Aabb {
     Aabb::new(low - padding, high + padding)
 }
 
-/// A binary tree with one box a leaf: split by the surface area heuristic over bins down to `costed_levels`, then, and
-/// where all centres coincide, in halves.
-fn binary(boxes: &[Aabb], costed_levels: u32) -> Bvh2 {
+/// A binary tree with one box a leaf: split by the surface area heuristic over bins, and in halves below
+/// COSTED_LEVELS and where all centres coincide.
+fn binary(boxes: &[Aabb]) -> Bvh2 {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = Vec::with_capacity(2 * boxes.len());
     nodes.push(Bvh2Node::default());
@@ -70,7 +67,7 @@ fn binary(boxes: &[Aabb], costed_levels: u32) -> Bvh2 {
             let centre = boxes[index as usize].center();
             centres.union(&Aabb::from_point(centre))
         });
-        let split = if level < costed_levels { costed_split(part, boxes, &centres) } else { None };
+        let split = if level < COSTED_LEVELS { costed_split(part, boxes, &centres) } else { None };
         let middle = split.unwrap_or_else(|| halve(part, boxes, &centres));
         let first = nodes.len();
         nodes[node] = Bvh2Node::new(whole, 0, first as u32);

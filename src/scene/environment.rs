@@ -8,6 +8,10 @@ use std::path::Path;
 /// Most texels of an image (16384 x 16384): a broken header must not ask for all memory.
 const TEXELS_MAX: usize = 1 << 28;
 
+/// Most negative light that an image may hold, as a share of the positive. Filters that resize a picture leave about
+/// half of this around bright lamps; more is a mistake.
+const NEGATIVE_SHARE_MAX: f64 = 0.01;
+
 impl Environment {
     /// The same radiance from everywhere.
     ///
@@ -22,8 +26,8 @@ impl Environment {
     /// Reads a latitude-longitude image: Radiance .hdr, or the first layer with R, G, B of an OpenEXR file.
     ///
     /// # Errors
-    /// [`Error::File`] if the file cannot be read or decoded; [`Error::Scene`] naming the texel for radiance that is
-    /// negative or not finite. Nothing is clamped.
+    /// [`Error::File`] if the file cannot be read or decoded; [`Error::Scene`] naming the texel for radiance that is not
+    /// finite. Negative radiance stays as it is; [`Scene::set_environment`](super::Scene::set_environment) judges it.
     pub fn load(path: impl AsRef<Path>) -> Result<Environment> {
         let path = path.as_ref();
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("").to_lowercase();
@@ -32,8 +36,9 @@ impl Environment {
             "exr" => read_exr(path)?,
             _ => return Err(Error::file(path, "an environment is a .hdr or .exr file")),
         };
-        if let Some((texel, problem)) = first_wrong(&radiance) {
-            let (column, row) = (texel as u32 % width, texel as u32 / width);
+        if let Some(texel) = radiance.iter().position(|texel| !texel.is_finite()) {
+            let (column, row, found) = (texel as u32 % width, texel as u32 / width, radiance[texel]);
+            let problem = format!("is {:?}; radiance must be finite", found.to_array());
             return Err(Error::scene(path, format!("texel ({column}, {row})"), problem));
         }
         if radiance.is_empty() {
@@ -59,8 +64,15 @@ impl Environment {
                 if radiance.is_empty() || *width as u64 * *height as u64 != radiance.len() as u64 {
                     return wrong(format!("{width} x {height} is not the size of {} texels", radiance.len()));
                 }
-                if let Some((texel, problem)) = first_wrong(radiance) {
-                    return wrong(format!("texel {texel} {problem}"));
+                if let Some(texel) = radiance.iter().position(|texel| !texel.is_finite()) {
+                    return wrong(format!("texel {texel} is {:?}; it must be finite", radiance[texel].to_array()));
+                }
+                let (negative, positive) = radiance.iter().fold((0.0, 0.0), |(negative, positive), texel| {
+                    let part = |texel: Vec3| texel.as_dvec3().element_sum();
+                    (negative - part(texel.min(Vec3::ZERO)), positive + part(texel.max(Vec3::ZERO)))
+                });
+                if negative > NEGATIVE_SHARE_MAX * positive {
+                    return wrong(format!("negative radiance sums to {negative}, positive to {positive}"));
                 }
             }
         }
@@ -72,12 +84,17 @@ impl Environment {
         }
         Ok(())
     }
-}
 
-/// The first texel that is no radiance, and what is wrong with it.
-fn first_wrong(radiance: &[Vec3]) -> Option<(usize, String)> {
-    let texel = radiance.iter().position(|texel| !(texel.is_finite() && texel.min_element() >= 0.0))?;
-    Some((texel, format!("is {:?}; radiance must be finite, not negative", radiance[texel].to_array())))
+    /// Raises negative texels to 0; how many there were.
+    pub(super) fn raise_negative(&mut self) -> usize {
+        let EnvironmentMap::Image { radiance, .. } = &mut self.map else { return 0 };
+        let mut raised = 0;
+        for texel in radiance.iter_mut().filter(|texel| texel.min_element() < 0.0) {
+            *texel = texel.max(Vec3::ZERO);
+            raised += 1;
+        }
+        raised
+    }
 }
 
 fn read_hdr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {

@@ -1,7 +1,8 @@
 //! From metres to internal units: centre, scale, and the geometry in f32.
 
+use super::json::shorten;
 use super::mesh::Triangle;
-use super::{Frame, Material};
+use super::{Camera, Frame, Light, LightKind, Material};
 use crate::{Error, Result, shared};
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -10,6 +11,8 @@ use std::path::Path;
 const RADIUS_RANGE: (f64, f64) = (1e-12, 1e12);
 /// Largest internal coordinate: beyond it, f32 boxes and areas lose their meaning.
 const COORDINATE_MAX: f64 = 1e9;
+/// Largest intensity in internal units: sums over many samples stay far below f32's largest number.
+const INTENSITY_MAX: f64 = 1e30;
 /// Least twice-area in internal units of which f32 can form a normal.
 const AREA_MIN: f64 = 1e-18;
 
@@ -68,6 +71,31 @@ pub(super) fn internal(
         return Err(Error::scene(file, "scene", "has no triangle large enough for its size"));
     }
     Ok((kept, shadings, dropped))
+}
+
+/// Refuses lights and cameras whose internal numbers f32 could not hold.
+pub(super) fn check_nodes(file: &Path, frame: &Frame, lights: &[Light], cameras: &[Camera]) -> Result<()> {
+    let far = |position: DVec3| {
+        let reach = ((position - frame.centre) * frame.scale).abs().max_element();
+        (reach > COORDINATE_MAX).then(|| format!("is {reach:e} times as far as the translucent part's radius"))
+    };
+    for light in lights {
+        let (position, factor) = match light.kind {
+            LightKind::Directional => (frame.centre, 1.0),
+            LightKind::Point | LightKind::Spot { .. } => (light.position, frame.scale * frame.scale),
+        };
+        let bright = light.intensity.max_element() * factor > INTENSITY_MAX;
+        let bright = bright.then(|| format!("is brighter than {INTENSITY_MAX:e} in internal units"));
+        if let Some(problem) = far(position).or(bright) {
+            return Err(Error::scene(file, format!("light `{}`", shorten(&light.name)), problem));
+        }
+    }
+    for camera in cameras {
+        if let Some(problem) = far(camera.eye) {
+            return Err(Error::scene(file, format!("camera `{}`", shorten(&camera.name)), problem));
+        }
+    }
+    Ok(())
 }
 
 fn vertices(triangle: &Triangle) -> [DVec3; 3] {

@@ -243,8 +243,9 @@ impl<'r, 'a> Meshes<'r, 'a> {
             warnings.push(format!("triangles of zero area were dropped: {}", self.dropped));
         }
         if self.opposed > 0 {
-            let problem = "triangles have normals that point against their winding";
-            warnings.push(format!("{} {problem}; the file may be inside out", self.opposed));
+            let inside_out = 2 * self.opposed > self.triangles.len() as u64;
+            let guess = if inside_out { "; the file may be inside out" } else { "" };
+            warnings.push(format!("triangles whose normals point against their winding: {}{guess}", self.opposed));
         }
         (self.triangles, self.sets, self.dropped)
     }

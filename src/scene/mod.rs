@@ -59,6 +59,9 @@ pub struct LoadOptions {
     pub materials: Vec<(String, String)>,
 }
 
+/// How warnings about the environment begin; a new environment takes them back.
+const ENVIRONMENT_WARNING: &str = "environment: ";
+
 impl Default for LoadOptions {
     fn default() -> Self {
         LoadOptions { unit: 1.0, materials: Vec::new() }
@@ -97,6 +100,7 @@ impl Scene {
         let gltf::Raw { triangles, dropped, materials, sets, lights, cameras, mut warnings } =
             gltf::read(file, bytes, options)?;
         let frame = frame::around(file, &triangles, &materials)?;
+        frame::check_nodes(file, &frame, &lights, &cameras)?;
         let (triangles, shadings, too_small) = frame::internal(file, &frame, &triangles)?;
         if too_small > 0 {
             warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
@@ -123,11 +127,19 @@ impl Scene {
 
     /// Replaces the light from infinitely far away, and brings [`Scene::hash`] up to date.
     ///
+    /// Negative texels of an image (filters leave some around bright spots) become 0, with a warning that counts them.
+    ///
     /// # Errors
-    /// [`Error::Setting`] for radiance that is negative or not finite, an image whose size does not fit its texels,
-    /// a rotation that is not finite, a scale that is negative or not finite.
-    pub fn set_environment(&mut self, environment: Environment) -> Result<()> {
+    /// [`Error::Setting`] for radiance that is not finite, a constant that is negative, an image with more negative
+    /// light than a hundredth of the positive or whose size does not fit its texels, a rotation that is not finite, a
+    /// scale that is negative or not finite.
+    pub fn set_environment(&mut self, mut environment: Environment) -> Result<()> {
         environment.check()?;
+        self.warnings.retain(|warning| !warning.starts_with(ENVIRONMENT_WARNING));
+        let raised = environment.raise_negative();
+        if raised > 0 {
+            self.warnings.push(format!("{ENVIRONMENT_WARNING}{raised} texels of negative radiance are taken as 0"));
+        }
         self.environment = environment;
         self.hash = hash::hash(self);
         Ok(())

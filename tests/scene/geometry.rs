@@ -204,9 +204,13 @@ fn normals_follow_the_surface() {
         assert!((shading.normal0.length() - 1.0).abs() < 1e-6);
     }
     assert!(!scene.warnings.iter().any(|warning| warning.contains("against their winding")));
-    let inside_out = [2.0, 0.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.0, 1.0, 2.0, 3.0, 1.0];
-    json["nodes"] = json!([{"mesh": 0, "matrix": inside_out}]);
-    assert!(volume(&metres(&load(&json))) > 0.0, "a mirror on either side of a mirror");
+    let mut turned = with_bytes(&positions, &indices.iter().rev().copied().collect::<Vec<_>>());
+    turned["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(0);
+    let warnings = load(&turned).warnings.join("; ");
+    assert!(warnings.contains("against their winding") && warnings.contains("inside out"), "{warnings}");
+    let unmirrored = [2.0, 0.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.0, 1.0, 2.0, 3.0, 1.0];
+    json["nodes"] = json!([{"mesh": 0, "matrix": unmirrored}]);
+    assert!(volume(&metres(&load(&json))) > 0.0);
 }
 
 #[test]

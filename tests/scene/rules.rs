@@ -230,6 +230,17 @@ fn cameras_and_lights() {
     for (json, member, problem) in table {
         assert_refused(&light(json), &format!("{item}{member}"), problem);
     }
+    assert_refused(&light(json!({"type": "point", "intensity": 1e35})), "light `light 0`", "is brighter than 1e30");
+    let far = |node: Value| {
+        let mut json = light(json!({"type": "point", "name": "star"}));
+        json["nodes"] = json!([{"mesh": 0, "children": [1]}, {"translation": [0, 1e12, 0]}]);
+        node.as_object().expect("an object").iter().for_each(|(key, value)| json["nodes"][1][key] = value.clone());
+        json["cameras"] = json!([{"name": "eye", "type": "perspective", "perspective": {"yfov": 1}}]);
+        json
+    };
+    let node = json!({"extensions": {"KHR_lights_punctual": {"light": 0}}});
+    assert_refused(&far(node), "light `star`", "times as far as the translucent part's radius");
+    assert_refused(&far(json!({"camera": 0})), "camera `eye`", "times as far as the translucent part's radius");
 }
 
 #[test]
