@@ -53,9 +53,9 @@ pub struct Dipole {
     pub albedo: f64,
     /// Effective transport coefficient [1/length].
     pub sigma_tr: f64,
-    /// Depth of the real source [length].
+    /// Depth of the real source, a length.
     pub z_real: f64,
-    /// Height of the virtual source [length].
+    /// Height of the virtual source, a length.
     pub z_virtual: f64,
 }
 

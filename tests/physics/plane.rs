@@ -146,3 +146,30 @@ fn interpolated_normals_are_those_of_the_hit() {
         assert!(found.error.x < 5e-3 * found.mean.x);
     }
 }
+
+#[test]
+fn light_below_the_geometric_horizon_counts_nothing() {
+    // A hit on a triangle so small that it does not shade itself, with an interpolated normal that leans over.
+    let mut world = World::new(matter(1.0, 0.95, 1.3, Energy), PROJECTION_NORMAL, 1);
+    world.features.environment = ENVIRONMENT_NONE;
+    world.triangle([DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::new(0.0, 1.0, 0.0)]);
+    let at = DVec3::X * 3.0;
+    world.triangle([at, at + 1e-5 * DVec3::X, at + 1e-5 * DVec3::Y]);
+    let leaning = DVec3::new(1.0, 0.0, 1.0).normalize().as_vec3();
+    let s = &mut world.shadings[1];
+    (s.normal0, s.normal1, s.normal2) = (leaning, leaning, leaning);
+    world.look(DVec3::Z * 5.0, DVec3::ZERO, 1e-3);
+    let surface = world.surface(0, DVec3::ZERO);
+    let probe =
+        Probe { offset: (at + DVec3::Z).as_vec3(), direction: -glam::Vec3::Z, t_min: -10.0, t_max: 10.0, radius: 3.0 };
+    let mut hits = Hits { count: 1, ..Default::default() };
+    (hits.t[0], hits.triangle[0]) = (1.0, 1);
+    for (height, lit) in [(0.05, true), (-0.05, false)] {
+        let mut world = world.clone();
+        world.light(sun(DVec3::new(-1.0, 0.0, -height), 1.0));
+        let inputs = world.inputs();
+        let step = translucent::reference::step(&inputs, 0, 0..1, 0..1);
+        let found = translucent::reference::accumulate::accumulate(&inputs, &step, 0, &surface, &probe, &hits);
+        assert_eq!(valid(found).x > 0.0, lit, "height {height}: {found:?}");
+    }
+}

@@ -8,7 +8,7 @@ use translucent::Normalisation::Energy;
 use translucent::reference::accumulate::{accumulate, choose};
 use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
 use translucent::reference::profile::Dipole;
-use translucent::reference::projection::seen;
+use translucent::reference::projection::{CAMERA, density, fractions, plane_density, seen, shapes};
 use translucent::reference::random::hash;
 use translucent::reference::sample::sample;
 use translucent::reference::step;
@@ -170,7 +170,7 @@ fn weights_are_bounded() {
         for before in [0.2, 1.0, 10.0, 40.0, eye.silhouette()] {
             let ball = Ball::new(material, PROJECTION_MIS, 1, eye, eye.silhouette() - before);
             let seen = seen(&ball.world.inputs(), &ball.surface);
-            let fractions = translucent::reference::projection::fractions(PROJECTION_MIS, seen.normal.dot(seen.wo));
+            let fractions = fractions(PROJECTION_MIS, seen.normal.dot(seen.wo));
             let least = fractions[..3].iter().copied().fold(1.0, f64::min);
             let mut world = ball.world.clone();
             for sample_index in 0..4000 {
@@ -190,6 +190,43 @@ fn weights_are_bounded() {
         }
     }
     assert!(largest > 0.1, "the bound would be void: {largest}");
+}
+
+#[test]
+fn the_given_method_divides_by_its_density() {
+    // s e^(-s r) / (2 pi r) in the plane, carried by the same lines as the mixture's camera rays, whose Jacobian is
+    // tested by differences: factor = strength shape(rho) / (that density). The eye is near, so that q matters.
+    let (sigma_s, sigma_a) = (dvec3(2.19, 2.62, 3.0) * 3.0, dvec3(0.0021, 0.0041, 0.0071) * 3.0);
+    let material = translucent::reference::profile::material(sigma_s, sigma_a, 1.5, Energy, 1e-6);
+    let rate = f64::from(material.camera_rate);
+    assert_eq!(material.camera_rate, material.sigma_tr.min_element());
+    for (eye, angle) in [(Eye::At(1.6), 30.0), (Eye::At(3.0), 60.0), (Eye::Infinite, 45.0)] {
+        let ball = Ball::new(material, PROJECTION_CAMERA, 1, eye, angle);
+        let seen = seen(&ball.world.inputs(), &ball.surface);
+        let mut world = ball.world.clone();
+        let mut found = 0;
+        for sample_index in 0..500 {
+            let step = step(&ball.world.inputs(), sample_index, 0..1, 0..1);
+            let probe = sample(&ball.world.inputs(), &step, 0, &ball.surface);
+            let hits = ball.hits(&probe, &mut world);
+            if hits.count == 0 {
+                continue;
+            }
+            found += 1;
+            let delta = probe.offset.as_dvec3() + f64::from(hits.t[0]) * probe.direction.as_dvec3();
+            let normal = (ball.position + delta).normalize();
+            let r = probe.offset.as_dvec3().length();
+            let jacobian = density(CAMERA, &material, &seen, delta, normal) / plane_density(&material, r);
+            let p = rate * (-rate * r).exp() / (std::f64::consts::TAU * r) * jacobian;
+            let expected = material.strength.as_dvec3() * shapes(&material, delta.length()) / p;
+            let (_, factor) = choose(&world.inputs(), &step, 0, &material, &seen, &probe, &hits).expect("one hit");
+            // Near the silhouette the normal's rounding, 1e-7, is divided by its cosine; near xo, delta's by rho.
+            let cosine = normal.dot(probe.direction.as_dvec3()).abs();
+            let tolerance = 1e-5 * (1.0 + 0.1 / cosine + 0.1 / delta.length());
+            assert!((factor / expected - 1.0).abs().max_element() < tolerance, "{eye:?}: {factor} for {expected}");
+        }
+        assert!(found > 50, "{eye:?}: {found}");
+    }
 }
 
 #[test]
@@ -249,7 +286,7 @@ fn mixture_tames_the_tail() {
         .map(|s| ball.value(&step(&ball.world.inputs(), s, 0..1, 0..20_000), s % 16, &mut world).x)
         .fold(0.0, f64::max);
     let seen = seen(&ball.world.inputs(), &ball.surface);
-    let fractions = translucent::reference::projection::fractions(PROJECTION_MIS, seen.normal.dot(seen.wo));
+    let fractions = fractions(PROJECTION_MIS, seen.normal.dot(seen.wo));
     let planar = Dipole::new(coefficients(5.0, ALBEDO).0, coefficients(5.0, ALBEDO).1, IOR).total();
     // Two hits on a sphere at most; one direction of constant light varies by Ft / (1 - rho_e).
     let light = transmittance(IOR, 1.0) / (1.0 - diffuse_reflectance(IOR, Side::Outside));
