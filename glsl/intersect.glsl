@@ -19,8 +19,6 @@ const uint CLOSEST = 0;
 const uint ANY = 1;
 const uint ALL = 2;
 const uint EVERY_SET = 0xffffffffu;
-// Depth of a tree of 2^32 leaves with two children a node; the host refuses deeper ones.
-const uint STACK_SIZE = 32;
 
 // The result: CLOSEST and ANY set the first entry.
 uint hit_count;
@@ -70,7 +68,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
     vec3 slack = abs(inv) * 4.76837158203125e-7 * (1.0 + max(abs(origin.x), max(abs(origin.y), abs(origin.z))));
     float t_max = ray.t_max;
 
-    uvec2 stack[STACK_SIZE];
+    uvec2 stack[BVH_DEPTH];
     uint stack_size = 0;
     uvec2 nodes_left = uvec2(0u, 0x80000000u);
     uint steps = 0;
@@ -84,7 +82,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
             // The low byte of the group says which of its children are inner nodes.
             uint node = 5u * (nodes_left.x + uint(bitCount(nodes_left.y & ~(0xffffffffu << slot) & 255u)));
             nodes_left.y &= ~(1u << bit);
-            if (nodes_left.y > 0x00ffffffu) stack[min(stack_size++, STACK_SIZE - 1)] = nodes_left;
+            if (nodes_left.y > 0x00ffffffu) stack[stack_size++] = nodes_left;
 
             uvec4 a = nodes[node], b = nodes[node + 1], x = nodes[node + 2], y = nodes[node + 3], z = nodes[node + 4];
             vec3 extent = vec3(uintBitsToFloat((a.w & 255u) << 23), uintBitsToFloat(((a.w >> 8) & 255u) << 23),

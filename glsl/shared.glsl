@@ -19,6 +19,8 @@ const uint MAX_RAYS = 8u;
 const float SHADOW_OFFSET = 3.8146973e-6;
 // Least GGX width of an opaque material, which has no mirror.
 const float OPAQUE_ALPHA_MIN = 0.001;
+// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
+const uint BVH_DEPTH = 24u;
 // Value of `Surface::triangle` for a ray that hits nothing.
 const uint MISS = 4294967295u;
 // Projection: all techniques combined by the balance heuristic.

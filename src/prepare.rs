@@ -61,7 +61,10 @@ pub fn resolution(scene: &Scene, settings: &Settings) -> Result<(u32, u32)> {
         }
     };
     if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
-        return Err(Error::setting("resolution", format!("{width}x{height} is not between 1x1 and {MAX_SIDE}x{MAX_SIDE}")));
+        return Err(Error::setting(
+            "resolution",
+            format!("{width}x{height} is not between 1x1 and {MAX_SIDE}x{MAX_SIDE}"),
+        ));
     }
     Ok((width, height))
 }

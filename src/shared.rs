@@ -153,9 +153,11 @@ constants! {
     MAX_RAYS: u32 = 8;
     /// Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
     /// roundings of a position. Creases narrower than this are lit as if open.
-    SHADOW_OFFSET: f32 = 3.814697265625e-6;
+    SHADOW_OFFSET: f32 = 3.814_697_3e-6;
     /// Least GGX width of an opaque material, which has no mirror.
     OPAQUE_ALPHA_MIN: f32 = 1e-3;
+    /// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
+    BVH_DEPTH: u32 = 24;
     /// Value of `Surface::triangle` for a ray that hits nothing.
     MISS: u32 = 0xffffffffu32;
 

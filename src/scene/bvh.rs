@@ -3,7 +3,10 @@
 //! obvhs' own binary builder takes quadratic time and linear depth where many boxes share a centre, and its conversion
 //! recurses, so a small file could overflow the stack; the builder here is bounded in both.
 
-use crate::{Error, Result, shared};
+use crate::{
+    Error, Result,
+    shared::{self, BVH_DEPTH},
+};
 use glam::{UVec4, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -12,9 +15,6 @@ use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 use std::path::Path;
-
-/// Most levels of nodes, the root included: a traversal that keeps one entry a level needs no larger stack.
-pub const MAX_DEPTH: usize = 24;
 
 /// Triangles of a leaf: three bits of a child's description count them.
 const LEAF_TRIANGLES: u32 = 3;
@@ -33,8 +33,8 @@ pub(super) fn build(file: &Path, triangles: &[shared::Triangle]) -> Result<(Vec<
     let boxes: Vec<Aabb> = triangles.iter().map(bounds).collect();
     let wide = bvh2_to_cwbvh(&binary(&boxes), LEAF_TRIANGLES, true, false);
     let depth = depth(&wide);
-    if depth > MAX_DEPTH {
-        return Err(Error::scene(file, "scene", format!("its BVH is {depth} levels deep; {MAX_DEPTH} at most")));
+    if depth > BVH_DEPTH as usize {
+        return Err(Error::scene(file, "scene", format!("its BVH is {depth} levels deep; {BVH_DEPTH} at most")));
     }
     let words: &[UVec4] = bytemuck::cast_slice(bytemuck::cast_slice::<CwBvhNode, u32>(&wide.nodes));
     Ok((words.to_vec(), wide.primitive_indices))

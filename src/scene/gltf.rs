@@ -1,7 +1,7 @@
 //! From a glTF or GLB file to metres: container, extensions, nodes, lights, cameras. Nothing here trusts the file.
 //!
-//! The file is read as plain JSON, not through typed structs: node transforms keep their 64 bits, errors name the
-//! item, and no required extension is refused but by our own list.
+//! The `gltf` crate opens the container. The JSON in it is read as it is, not through that crate's structs: node
+//! transforms keep their 64 bits, errors name the item, and no required extension is refused but by our own list.
 
 use super::accessor::Arrays;
 use super::json::{Item, shorten};
@@ -10,7 +10,7 @@ use super::{Camera, Lens, Light, LightKind, LoadOptions, Material, Set, material
 use crate::{Error, Result};
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 /// What a file holds, in metres.
 pub(super) struct Raw {
@@ -60,7 +60,7 @@ const COORDINATE_MAX: f64 = 1e30;
 /// Reads a whole file that lies (or would lie) at `file`.
 pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Raw> {
     let (json, binary) = split(file, bytes)?;
-    let value: Value = serde_json::from_slice(json)
+    let value: Value = serde_json::from_slice(&json)
         .map_err(|error| Error::scene(file, "glTF", format!("is not valid JSON: {error}")))?;
     let root = Item::root(file, &value);
     let mut warnings = Vec::new();
@@ -76,7 +76,7 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
     let default_material = materials.len();
     materials.push(material::default_material());
 
-    let arrays = Arrays::new(&root, binary)?;
+    let arrays = Arrays::new(&root, binary.as_deref())?;
     let nodes = root.list("nodes")?;
     let transforms = place_nodes(&root, &nodes, &mut warnings)?;
     let mut meshes = Meshes::new(&root, &arrays, default_material)?;
@@ -117,42 +117,23 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
     Ok(Raw { triangles, dropped, materials, sets, lights, cameras, warnings })
 }
 
-/// The JSON text and the binary chunk of a GLB container, or the whole file as JSON.
-fn split<'a>(file: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)> {
+/// JSON text and binary chunk of a file.
+type Chunks<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
+
+/// Those of a GLB container, or the whole file as JSON.
+fn split<'a>(file: &Path, bytes: &'a [u8]) -> Result<Chunks<'a>> {
     let error = |problem: String| Error::scene(file, "GLB container", problem);
-    let word = |at: usize| -> Option<u32> {
-        let word = bytes.get(at..at.checked_add(4)?)?;
-        Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-    };
     if !bytes.starts_with(b"glTF") {
-        return Ok((bytes, None));
+        return Ok((bytes.into(), None));
     }
-    match word(4) {
-        Some(2) => {}
-        Some(version) => return Err(error(format!("version {version}; only 2 is read"))),
-        None => return Err(error("ends within its header".into())),
-    }
-    let length = word(8).ok_or_else(|| error("ends within its header".into()))? as usize;
-    if length > bytes.len() {
+    // The crate subtracts the header's size from this unchecked.
+    let Some(&[a, b, c, d]) = bytes.get(8..12) else { return Err(error("ends within its header".into())) };
+    let length = u32::from_le_bytes([a, b, c, d]) as usize;
+    if length < 12 || length > bytes.len() {
         return Err(error(format!("says it has {length} bytes, but has {}", bytes.len())));
     }
-    let (mut json, mut binary) = (None, None);
-    let mut at = 12;
-    while at < length {
-        let (Some(size), Some(kind)) = (word(at), word(at + 4)) else {
-            return Err(error(format!("ends within the header of the chunk at byte {at}")));
-        };
-        let chunk = (at + 8).checked_add(size as usize).and_then(|end| bytes.get(at + 8..end));
-        let chunk = chunk.ok_or_else(|| error(format!("the chunk at byte {at} reaches beyond the end")))?;
-        match &kind.to_le_bytes() {
-            b"JSON" if json.is_none() => json = Some(chunk),
-            b"BIN\0" if binary.is_none() => binary = Some(chunk),
-            _ => {}
-        }
-        at += 8 + chunk.len().next_multiple_of(4);
-    }
-    let json = json.ok_or_else(|| error("has no JSON chunk".into()))?;
-    Ok((json, binary))
+    let container = ::gltf::binary::Glb::from_slice(&bytes[..length]).map_err(|problem| error(problem.to_string()))?;
+    Ok((container.json, container.bin))
 }
 
 /// Version and extensions.

@@ -14,7 +14,6 @@ mod mesh;
 mod presets;
 mod unit;
 
-pub use bvh::MAX_DEPTH;
 pub use presets::{Preset, preset, presets};
 pub use unit::parse_unit;
 

@@ -126,7 +126,15 @@ fn sphere_in_uniform_light_is_flat() {
                 let position = DVec3::new(at("P.X"), at("P.Y"), at("P.Z"));
                 let wo = if lens > 0.0 { (eye.eye - position).normalize() } else { DVec3::Z };
                 let cos = normal.dot(wo);
-                let class = if cos > 0.6 { 0 } else if cos > 0.3 { 1 } else if cos > 0.1 { 2 } else { continue };
+                let class = if cos > 0.6 {
+                    0
+                } else if cos > 0.3 {
+                    1
+                } else if cos > 0.1 {
+                    2
+                } else {
+                    continue;
+                };
                 let mean = (at("subsurface.R") + at("subsurface.G") + at("subsurface.B")) / 3.0;
                 classes[class].push(mean / transmittance(1.3, cos) / expected);
             }

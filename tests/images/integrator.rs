@@ -110,7 +110,9 @@ fn sphere() {
     };
     let mesh = &experiment.meshes[0];
     // Middles of triangles: lit from the front, at the terminator, and on the dark side seen at a shallow angle.
-    for (index, eye) in [(40, DVec3::new(3.0, 4.0, 2.0)), (700, DVec3::new(1.0, 5.0, 1.0)), (1500, DVec3::new(6.0, 1.0, 5.0))] {
+    for (index, eye) in
+        [(40, DVec3::new(3.0, 4.0, 2.0)), (700, DVec3::new(1.0, 5.0, 1.0)), (1500, DVec3::new(6.0, 1.0, 5.0))]
+    {
         let [a, b, c] = corners(mesh)[index];
         let (point, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
         let eye = if (eye - point).normalize().dot(normal) > 0.1 { eye } else { point + 4.0 * normal + eye };
@@ -163,11 +165,8 @@ fn concave() -> Mesh {
 
 #[test]
 fn concave_shape_shadows_itself() {
-    let experiment = Experiment {
-        meshes: vec![concave()],
-        lamps: vec![sun(DVec3::new(0.6, -1.0, -0.3))],
-        surrounding: 0.3,
-    };
+    let experiment =
+        Experiment { meshes: vec![concave()], lamps: vec![sun(DVec3::new(0.6, -1.0, -0.3))], surrounding: 0.3 };
     let eye = DVec3::new(4.0, 5.0, 3.0);
     experiment.compare("L, inner corner", DVec3::new(1.05, 1.0, 0.5), DVec3::Y, eye);
     experiment.compare("L, inner wall", DVec3::new(1.0, 1.3, 0.4), DVec3::X, eye);

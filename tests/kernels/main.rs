@@ -112,7 +112,11 @@ pub fn assert_close(what: &str, errors: &[f64]) {
     let mut sorted: Vec<f64> = errors.to_vec();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[sorted.len() / 2];
-    println!("{what}: {} items, median {median:.1e}, {outside} beyond 1e-5, worst {:.1e}", errors.len(), sorted[sorted.len() - 1]);
+    println!(
+        "{what}: {} items, median {median:.1e}, {outside} beyond 1e-5, worst {:.1e}",
+        errors.len(),
+        sorted[sorted.len() - 1]
+    );
     assert!(errors.iter().all(|e| !e.is_nan()), "{what}: NaN");
     assert!(outside * 1000 <= errors.len(), "{what}: {outside} of {} items differ by more than 1e-5", errors.len());
 }

