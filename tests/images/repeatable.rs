@@ -1,4 +1,5 @@
 //! The image is a function of scene, settings and samples alone.
+#![allow(clippy::single_range_in_vec_init)] // lists of ranges, of which some hold one
 
 use crate::{channel, device};
 use std::ops::ControlFlow;
