@@ -13,7 +13,7 @@ const uint STRATUM = 4u;
 // Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
 const uint MAX_HITS = 8u;
 // Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
-const uint MAX_RAYS = 8u;
+const uint MAX_RAYS = 4u;
 // Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
 // roundings of a position. Creases narrower than this are lit as if open.
 const float SHADOW_OFFSET = 3.8146973e-6;

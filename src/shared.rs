@@ -150,7 +150,7 @@ constants! {
     /// Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
     MAX_HITS: u32 = 8;
     /// Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
-    MAX_RAYS: u32 = 8;
+    MAX_RAYS: u32 = 4;
     /// Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
     /// roundings of a position. Creases narrower than this are lit as if open.
     SHADOW_OFFSET: f32 = 3.814_697_3e-6;
