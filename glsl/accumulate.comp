@@ -28,6 +28,23 @@ vec3 camera_factor(Seen s, Material m, Probe probe, vec3 delta, vec3 n) {
     return value * (2.0 * PI * probe.radius / m.camera_rate * jacobian);
 }
 
+// Adds to the sums of the pixel and, where they are kept, of the sample's batch.
+void add_subsurface(uint index, vec3 radiance) {
+    vec3 sum = running_sums[index].subsurface, carry = running_sums[index].subsurface_carry;
+    uint batch_index = step_.sample_index % BATCHES * step_.pixel_count + index;
+    vec3 batch_sum = vec3(0.0);
+    if (BATCHED != 0) batch_sum = batch_sums[batch_index];
+    // The batch's sum rounds otherwise, so that it may overflow alone.
+    if (!addable(radiance, sum) || !addable(radiance, batch_sum)) {
+        count_invalid(index);
+        return;
+    }
+    if (BATCHED != 0) batch_sums[batch_index] = batch_sum + radiance;
+    compensated_add(sum, carry, radiance);
+    running_sums[index].subsurface = sum;
+    running_sums[index].subsurface_carry = carry;
+}
+
 void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
@@ -118,7 +135,5 @@ void main() {
     }
 
     vec3 radiance = transmittance(m.ior, dot(s.shading_normal, s.wo)) * factor * entering;
-    if (!check(index, radiance)) return;
     add_subsurface(index, radiance);
-    if (BATCHED != 0) batch_sums[batch * step_.pixel_count + index] += radiance;
 }

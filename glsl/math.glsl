@@ -103,6 +103,11 @@ bool finite_(float x) {
     return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u;
 }
 
+// The largest finite number in place of infinity, for x >= 0.
+vec3 clamp_finite(vec3 x) {
+    return uintBitsToFloat(min(floatBitsToUint(x), uvec3(0x7f7fffffu)));
+}
+
 // Finite and not negative.
 bool valid(vec3 x) {
     return finite_(x.x) && finite_(x.y) && finite_(x.z) && x.x >= 0.0 && x.y >= 0.0 && x.z >= 0.0;

@@ -34,6 +34,17 @@ float visible_normal_density(float alpha, vec3 wo, vec3 wi) {
     return ggx_distribution(alpha, h) / ((1.0 + ggx_lambda(alpha, wo)) * 4.0 * wo.z);
 }
 
+void add_reflection(uint index, vec3 radiance) {
+    vec3 sum = running_sums[index].reflection, carry = running_sums[index].reflection_carry;
+    if (!addable(radiance, sum)) {
+        count_invalid(index);
+        return;
+    }
+    compensated_add(sum, carry, radiance);
+    running_sums[index].reflection = sum;
+    running_sums[index].reflection_carry = carry;
+}
+
 void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
@@ -108,5 +119,5 @@ void main() {
         }
         if (step_.first != 0) radiance += m.emission;
     }
-    if (check(index, radiance)) add_reflection(index, radiance);
+    add_reflection(index, radiance);
 }

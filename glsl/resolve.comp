@@ -1,6 +1,8 @@
-// Turns the running sums of each pixel into its means and the variance of the mean between batches.
+// Turns the running sums of each pixel into its means and the variance of the mean between batches. What exceeds f32 is
+// its largest number.
 #version 460
 #include "shared.glsl"
+#include "math.glsl"
 #include "pixel.glsl"
 RUNNING_SUMS(readonly);
 BATCH_SUMS(readonly);
@@ -17,20 +19,30 @@ void main() {
     Sums sums = running_sums[index];
     Pixel pixel;
     float n = float(max(sums.samples, 1u));
-    pixel.subsurface = max((sums.subsurface + sums.subsurface_carry) / n, vec3(0.0));
-    pixel.reflection = max((sums.reflection + sums.reflection_carry) / n, vec3(0.0));
+    // Divided first: sum and carry together may exceed f32.
+    pixel.subsurface = clamp_finite(max(sums.subsurface / n + sums.subsurface_carry / n, vec3(0.0)));
+    pixel.reflection = clamp_finite(max(sums.reflection / n + sums.reflection_carry / n, vec3(0.0)));
     pixel.variance = vec3(0.0);
     if (BATCHED != 0) {
+        float samples = max(float(step_.range_end - step_.range_begin), 1.0);
         vec3 mean = vec3(0.0);
-        for (uint b = 0; b < BATCHES; b++) mean += batch_sums[b * step_.pixel_count + index];
-        float samples = float(step_.range_end - step_.range_begin);
-        mean /= samples;
+        for (uint b = 0; b < BATCHES; b++) mean += batch_sums[b * step_.pixel_count + index] / samples;
+        // Relative to the largest deviation, whose square may exceed f32.
+        vec3 largest = vec3(0.0);
+        vec3 deviation[BATCHES];
+        float n_b[BATCHES];
         for (uint b = 0; b < BATCHES; b++) {
-            float n_b = float(samples_of_batch(b, step_.range_end) - samples_of_batch(b, step_.range_begin));
-            vec3 deviation = batch_sums[b * step_.pixel_count + index] / max(n_b, 1.0) - mean;
-            pixel.variance += n_b * deviation * deviation;
+            n_b[b] = float(samples_of_batch(b, step_.range_end) - samples_of_batch(b, step_.range_begin));
+            deviation[b] = batch_sums[b * step_.pixel_count + index] / max(n_b[b], 1.0) - mean;
+            largest = max(largest, abs(deviation[b]));
         }
-        pixel.variance /= float(BATCHES - 1u) * samples;
+        vec3 scale = max(largest, vec3(1e-30));
+        vec3 squares = vec3(0.0);
+        for (uint b = 0; b < BATCHES; b++) {
+            vec3 relative = deviation[b] / scale;
+            squares += n_b[b] * relative * relative;
+        }
+        pixel.variance = clamp_finite(squares / (float(BATCHES - 1u) * samples) * scale * scale);
     }
     pixel.alpha = float(sums.covered) / n;
     pixel.samples = sums.samples;

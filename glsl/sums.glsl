@@ -1,4 +1,4 @@
-// The running sums of a pixel.
+// The running sums of a pixel. What would make one of them infinite is left out and counted.
 
 RUNNING_SUMS(read_write);
 
@@ -7,11 +7,8 @@ void count_sample(uint index, bool covered) {
     running_sums[index].covered += covered ? 1u : 0u;
 }
 
-// Whether a contribution may enter a sum; if not, it is counted.
-bool check(uint index, vec3 radiance) {
-    if (valid(radiance)) return true;
+void count_invalid(uint index) {
     running_sums[index].invalid++;
-    return false;
 }
 
 // Adds x to the compensated sum (sum, carry): Knuth's TwoSum, exact whatever the magnitudes.
@@ -23,16 +20,7 @@ void compensated_add(inout vec3 sum, inout vec3 carry, vec3 x) {
     carry += e;
 }
 
-void add_subsurface(uint index, vec3 radiance) {
-    vec3 sum = running_sums[index].subsurface, carry = running_sums[index].subsurface_carry;
-    compensated_add(sum, carry, radiance);
-    running_sums[index].subsurface = sum;
-    running_sums[index].subsurface_carry = carry;
-}
-
-void add_reflection(uint index, vec3 radiance) {
-    vec3 sum = running_sums[index].reflection, carry = running_sums[index].reflection_carry;
-    compensated_add(sum, carry, radiance);
-    running_sums[index].reflection = sum;
-    running_sums[index].reflection_carry = carry;
+// Whether radiance is finite and not negative, and the sum with it finite.
+bool addable(vec3 radiance, vec3 sum) {
+    return valid(radiance) && valid(sum + radiance);
 }

@@ -388,11 +388,11 @@ structs! {
         samples: u32,
         /// Samples whose camera ray hit the scene.
         covered: u32,
-        /// Contributions left out because they were not finite and non-negative.
+        /// Contributions left out because they were not finite and non-negative, or a sum with them not finite.
         invalid: u32,
     }
 
-    /// A pixel of the finished image.
+    /// A pixel of the finished image. What exceeds f32 is its largest finite number.
     struct Pixel {
         subsurface: Vec3,
         reflection: Vec3,

@@ -20,7 +20,7 @@
 //!
 //! # Sums
 //! Compensated: D. E. Knuth's TwoSum finds the rounding error of each addition exactly and a second number carries it
-//! (A. Neumaier, ZAMM 54 (1974)).
+//! (A. Neumaier, ZAMM 54 (1974)). A contribution with which a sum would exceed f32 is left out and counted as invalid.
 
 use super::boundary::transmittance;
 use super::light::{self, FAR};
@@ -58,9 +58,12 @@ impl Contribution {
     /// kernel keeps none, a caller's to forget.
     pub fn add_subsurface(&self, step: &Step, surface: &Surface, sums: &mut Sums, batch_sum: &mut Vec3) {
         let radiance = self.radiance.as_vec3();
-        add(&mut sums.subsurface, &mut sums.subsurface_carry, radiance);
-        *batch_sum += radiance;
-        sums.invalid += u32::from(self.invalid);
+        let fits = !self.invalid && (sums.subsurface + radiance).is_finite() && (*batch_sum + radiance).is_finite();
+        if fits {
+            add(&mut sums.subsurface, &mut sums.subsurface_carry, radiance);
+            *batch_sum += radiance;
+        }
+        sums.invalid += u32::from(!fits);
         if step.count != 0 {
             sums.samples += 1;
             sums.covered += u32::from(surface.triangle != MISS);

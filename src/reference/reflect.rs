@@ -37,8 +37,12 @@ pub fn reflect(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> C
 
 /// Adds to the sums of a pixel as `reflect.comp` does.
 pub fn add_reflection(contribution: &Contribution, sums: &mut Sums) {
-    add(&mut sums.reflection, &mut sums.reflection_carry, contribution.radiance.as_vec3());
-    sums.invalid += u32::from(contribution.invalid);
+    let radiance = contribution.radiance.as_vec3();
+    let fits = !contribution.invalid && (sums.reflection + radiance).is_finite();
+    if fits {
+        add(&mut sums.reflection, &mut sums.reflection_carry, radiance);
+    }
+    sums.invalid += u32::from(!fits);
 }
 
 fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen, lobe: &Lobe, k: u32) -> DVec3 {

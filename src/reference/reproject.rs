@@ -2,11 +2,16 @@
 //!
 //! All hits count (the density is of points of the surface, not of probes); of more than MAX_HITS, each is kept with
 //! the same probability by reservoir sampling (J. S. Vitter, ACM TOMS 11 (1985), algorithm R), and `accumulate`
-//! multiplies by count / MAX_HITS. The method as given keeps the first hit only.
+//! multiplies by count / MAX_HITS. The n-th hit found replaces entry h mod n, if there is one, with
+//!
+//!   h = hash(key(seed, pixel, batch, DIM_OVERFLOW) + hash(number of the sample within its batch) + n):
+//!
+//! every sample decides anew. Which hit is the n-th depends on the order of traversal, so kernel and twin may keep
+//! different ones. The method as given keeps the first hit only.
 
 use super::random::{batch, hash, key};
 use super::{Inputs, intersect, pixel};
-use crate::shared::{DIM_OVERFLOW, Hits, MAX_HITS, PROJECTION_CAMERA, Probe, Step, Surface};
+use crate::shared::{BATCHES, DIM_OVERFLOW, Hits, MAX_HITS, PROJECTION_CAMERA, Probe, Step, Surface};
 
 /// The hits of the probe of pixel `index` of the band, whose first surface is `surface`.
 pub fn reproject(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, probe: &Probe) -> Hits {
@@ -26,7 +31,8 @@ pub fn reproject(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, pr
         found.count = kept.len() as u32;
     } else {
         let (px, py) = pixel(inputs.view, step, index);
-        let key = key(inputs.view.seed, px, py, batch(step.sample_index), DIM_OVERFLOW);
+        let key = key(inputs.view.seed, px, py, batch(step.sample_index), DIM_OVERFLOW)
+            .wrapping_add(hash(step.sample_index / BATCHES));
         for hit in all {
             found.count += 1;
             if found.count <= MAX_HITS {

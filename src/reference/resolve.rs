@@ -5,7 +5,8 @@
 //!
 //!   sum of n_b (S_b / n_b - m)^2 / (B - 1) / n,   m = sum of S_b / n.
 //!
-//! The spread inside one scrambled sequence would overstate it many times, because its points avoid each other.
+//! The spread inside one scrambled sequence would overstate it many times, because its points avoid each other. Means and
+//! variances beyond f32 become its largest number.
 
 use crate::shared::{BATCHES, Features, Pixel, Step, Sums};
 use glam::{DVec3, Vec3};
@@ -19,15 +20,20 @@ pub fn batch_count(begin: u32, end: u32, batch: u32) -> u32 {
 /// The pixel of its sums; `batch_sums` is empty or holds one sum per batch.
 pub fn resolve(features: &Features, step: &Step, sums: &Sums, batch_sums: &[Vec3]) -> Pixel {
     let count = f64::from(sums.samples.max(1));
-    let mean = |sum: Vec3, carry: Vec3| ((sum.as_dvec3() + carry.as_dvec3()) / count).as_vec3();
+    let mean = |sum: Vec3, carry: Vec3| finite((sum.as_dvec3() + carry.as_dvec3()) / count);
     Pixel {
         subsurface: mean(sums.subsurface, sums.subsurface_carry),
         reflection: mean(sums.reflection, sums.reflection_carry),
-        variance: if features.batches != 0 { variance(step, batch_sums).as_vec3() } else { Vec3::ZERO },
+        variance: if features.batches != 0 { finite(variance(step, batch_sums)) } else { Vec3::ZERO },
         alpha: (f64::from(sums.covered) / count) as f32,
         samples: sums.samples,
         invalid: sums.invalid,
     }
+}
+
+/// In f32, whose largest number stands for all beyond it.
+fn finite(x: DVec3) -> Vec3 {
+    x.min(DVec3::splat(f32::MAX.into())).as_vec3()
 }
 
 fn variance(step: &Step, batch_sums: &[Vec3]) -> DVec3 {

@@ -1,4 +1,5 @@
-//! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it.
+//! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it. Every value is
+//! finite: what exceeds f32 is its largest number.
 
 use super::{Renderer, spirv_hash};
 use crate::{
@@ -116,7 +117,8 @@ impl Channels {
     }
 
     fn push(&mut self, pixel: &Pixel, centre: &Centre) {
-        let light = pixel.subsurface + pixel.reflection;
+        // Two finite layers may exceed f32 together.
+        let light = (pixel.subsurface + pixel.reflection).min(Vec3::MAX);
         let position = centre.position.as_vec3();
         let mut values = Vec::with_capacity(self.list.len());
         values.extend(light.to_array());

@@ -287,7 +287,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// The image of the samples so far, with every channel and attribute.
+    /// The image of the samples so far, with every channel and attribute. Every value is finite: a mean or variance beyond
+    /// f32 is its largest number, and samples that would overflow a sum are left out and counted (`invalidSamples`).
     pub fn image(&mut self) -> Result<Image> {
         assemble::image(self)
     }
