@@ -3,6 +3,7 @@
 use crate::{Case, assert_close};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use translucent::{
     Projection, Scene, Settings,
     reference::{
@@ -61,7 +62,7 @@ struct Stages {
     hits: Vec<Hits>,
 }
 
-/// Samples from different batches and strata.
+/// Samples from different batches and strata, by turns.
 const SAMPLES: [u32; 2] = [37, 1003];
 
 fn stages(inputs: &Inputs, sample_index: u32) -> Stages {
@@ -82,11 +83,17 @@ fn g_buffers(step: &Step, surfaces: &[Surface]) -> Vec<Surface> {
 }
 
 fn for_each_case(mut test: impl FnMut(&str, &Case, &Stages)) {
-    for (name, case) in cases() {
-        for sample_index in SAMPLES {
-            test(&format!("{name}, sample {sample_index}"), &case, &stages(&case.inputs(), sample_index));
-        }
-    }
+    // Computed once for all tests: the twins search every triangle.
+    static CASES: OnceLock<Vec<(String, Case, Stages)>> = OnceLock::new();
+    let compute = || {
+        let with_stages = |(index, (name, case)): (usize, (String, Case))| {
+            let sample_index = SAMPLES[index % SAMPLES.len()];
+            let stages = stages(&case.inputs(), sample_index);
+            (format!("{name}, sample {sample_index}"), case, stages)
+        };
+        cases().into_iter().enumerate().map(with_stages).collect()
+    };
+    CASES.get_or_init(compute).iter().for_each(|(name, case, stages)| test(name, case, stages));
 }
 
 /// Length of the difference over `scale`.
