@@ -99,6 +99,19 @@ fn more_rays_than_a_dispatch_traces() {
     }
 }
 
+#[test]
+fn environments_of_one_texel_or_row() {
+    for (width, height) in [(1, 1), (1, 3), (3, 1)] {
+        let texel = |i: u32| Vec3::new(1.0, 0.5, 0.2) * (1 + i) as f32;
+        let radiance = (0..width * height).map(texel).collect();
+        let map = EnvironmentMap::Image { width, height, radiance };
+        let mut scene = ball(&[]);
+        scene.set_environment(Environment { map, rotation: 30.0, scale: 1.0 }).expect("valid");
+        let image = assert_agree(&format!("{width}x{height} texels"), &scene, &settings(5, 5), 8);
+        assert!(lit(&image, "subsurface") && lit(&image, "reflection"));
+    }
+}
+
 /// An image whose values are finite and, where they are light, not negative; and the number of its invalid samples.
 fn sane(what: &str, scene: &Scene, samples: u32) -> (Image, i32) {
     let device = device();

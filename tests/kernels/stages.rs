@@ -155,7 +155,7 @@ fn reproject_finds_the_twins_hits() {
     let mut several = 0;
     for_each_case(|_, case, stages| {
         let surfaces = g_buffers(&stages.step, &stages.surfaces);
-        let hits = vec![Hits::default(); stages.hits.len()];
+        let hits = vec![STALE; stages.hits.len()];
         let buffers: [(Slot, &[u8]); 3] = [
             (Slot::Surfaces, bytemuck::cast_slice(&surfaces)),
             (Slot::Probes, bytemuck::cast_slice(&stages.probes)),
@@ -181,15 +181,21 @@ fn reproject_finds_the_twins_hits() {
     assert_close("reproject", &errors);
 }
 
+/// What an earlier sample may have left: hits of triangles that do not exist.
+const STALE: Hits = Hits { count: 99, t: [1.0; 8], triangle: [MISS; 8] };
+
 /// The new sums over what they were, for a kernel that adds to them.
 fn run_sums(case: &Case, stem: &'static str, stages: &Stages) -> (Vec<Sums>, Vec<Vec3>) {
     let surfaces = g_buffers(&stages.step, &stages.surfaces);
     let sums = vec![Sums::default(); stages.surfaces.len()];
     let batch_sums = vec![Vec3::ZERO; stages.surfaces.len() * BATCHES as usize];
+    // A pixel without a probe has no hits, whatever its list says.
+    let lists = stages.hits.iter().zip(&stages.probes);
+    let hits: Vec<Hits> = lists.map(|(hits, probe)| if probe.t_min <= probe.t_max { *hits } else { STALE }).collect();
     let buffers: [(Slot, &[u8]); 5] = [
         (Slot::Surfaces, bytemuck::cast_slice(&surfaces)),
         (Slot::Probes, bytemuck::cast_slice(&stages.probes)),
-        (Slot::HitLists, bytemuck::cast_slice(&stages.hits)),
+        (Slot::HitLists, bytemuck::cast_slice(&hits)),
         (Slot::RunningSums, bytemuck::cast_slice(&sums)),
         (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
     ];
