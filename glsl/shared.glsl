@@ -253,11 +253,11 @@ struct Sums {
     uint samples;
     // Samples whose camera ray hit the scene.
     uint covered;
-    // Contributions left out because they were not finite and non-negative.
+    // Contributions left out because they were not finite and non-negative, or a sum with them not finite.
     uint invalid;
 };
 
-// A pixel of the finished image.
+// A pixel of the finished image. What exceeds f32 is its largest finite number.
 struct Pixel {
     vec3 subsurface;
     vec3 reflection;

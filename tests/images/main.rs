@@ -1,11 +1,13 @@
-//! Whole renders on the device: against closed forms, against the independent area integrator, and against themselves.
-//! Under the validation layer with synchronization checks.
+//! Whole renders on the device: against closed forms, against the independent area integrator, against the twins,
+//! and against themselves. Under the validation layer with synchronization checks.
 
 mod closed_forms;
+mod edge_cases;
 mod integrator;
 mod repeatable;
 mod scenes;
 mod statistics;
+mod twins;
 
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use translucent::{Device, DeviceOptions, Renderer, Scene, Settings, image::Image};

@@ -1,30 +1,120 @@
 //! Each kernel alone against its f64 twin, fed with the twin's output of the stage before; under the validation layer
 //! with synchronization checks.
 
+// Each test program uses its part.
+#[allow(dead_code)]
+#[path = "../common/mod.rs"]
+mod common;
+mod overflow;
+#[allow(dead_code)]
+#[path = "../images/scenes.rs"]
+mod scenes;
 mod shared;
+mod sphere;
 mod stages;
 mod steps;
 
 use bytemuck::Pod;
 use glam::UVec4;
-use std::sync::{Mutex, MutexGuard, OnceLock};
+use std::{
+    collections::HashMap,
+    sync::{Mutex, MutexGuard, OnceLock},
+};
 use translucent::{
     Device, DeviceOptions, Scene, Settings,
     gpu::{Bindings, Buffer, Kernel, Layout, Location, Recorder, download, upload},
     prepare::{Prepared, prepare},
     reference::Inputs,
     render::SPIRV,
-    shared::{Slot, Step},
+    shared::{Features, Slot, Step},
 };
 
-/// The device that all tests share, one test at a time.
-pub fn device() -> MutexGuard<'static, Device> {
-    static DEVICE: OnceLock<Mutex<Device>> = OnceLock::new();
-    let open = || {
+/// The device that all tests share, one test at a time, and the kernels made on it.
+pub struct Bench {
+    pub device: Device,
+    layout: Layout,
+    recorder: Recorder,
+    kernels: HashMap<(&'static str, Features), Kernel>,
+}
+
+pub fn bench() -> MutexGuard<'static, Bench> {
+    static BENCH: OnceLock<Mutex<Bench>> = OnceLock::new();
+    let make = || {
         let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
-        Mutex::new(Device::open(&options).expect("a Vulkan device and the validation layer"))
+        let device = Device::open(&options).expect("a Vulkan device and the validation layer");
+        let layout = Layout::new(&device).expect("layout");
+        let recorder = Recorder::new(&device).expect("recorder");
+        Mutex::new(Bench { device, layout, recorder, kernels: HashMap::new() })
     };
-    DEVICE.get_or_init(open).lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    BENCH.get_or_init(make).lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+impl Bench {
+    /// What kernels read of `inputs`, and `buffers`, on the device.
+    pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Loaded {
+        let fixed: [(Slot, &[u8]); 9] = [
+            (Slot::Views, bytemuck::bytes_of(inputs.view)),
+            (Slot::Nodes, bytemuck::cast_slice(nodes)),
+            (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
+            (Slot::Shadings, bytemuck::cast_slice(inputs.shadings)),
+            (Slot::Materials, bytemuck::cast_slice(inputs.materials)),
+            (Slot::Lights, bytemuck::cast_slice(inputs.lights)),
+            (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
+            (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),
+            (Slot::Counters, &[0; 4]),
+        ];
+        let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
+        let make = |(slot, data): (Slot, &[u8])| {
+            let buffer = Buffer::new(&self.device, slot.name(), data.len() as u64, Location::Device).expect("buffer");
+            upload(&self.device, &buffer, data).expect("upload");
+            (slot, buffer)
+        };
+        let buffers: Vec<_> = given.map(make).collect();
+        let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
+        let bindings = Bindings::new(&self.layout, &bound).expect("bindings");
+        Loaded { features: inputs.features, bindings, buffers }
+    }
+
+    /// Runs one kernel once.
+    pub fn dispatch(&mut self, stem: &'static str, loaded: &Loaded, step: &Step) {
+        let Bench { layout, recorder, kernels, .. } = self;
+        let kernel = kernels.entry((stem, loaded.features)).or_insert_with(|| {
+            let (_, spirv) = SPIRV.iter().find(|(name, _)| *name == stem).expect("the kernel exists");
+            Kernel::new(layout, stem, spirv, &loaded.features, 64).expect("kernel")
+        });
+        recorder.begin().expect("begin");
+        recorder.dispatch(kernel, &loaded.bindings, step.pixel_count, step);
+        recorder.submit_and_wait().expect("submit");
+    }
+
+    pub fn write<T: Pod>(&self, loaded: &Loaded, slot: Slot, data: &[T]) {
+        upload(&self.device, loaded.buffer(slot), bytemuck::cast_slice(data)).expect("upload");
+    }
+
+    pub fn read<T: Pod>(&self, loaded: &Loaded, slot: Slot) -> Vec<T> {
+        let buffer = loaded.buffer(slot);
+        bytemuck::pod_collect_to_vec(&download(&self.device, buffer, buffer.bytes()).expect("download"))
+    }
+
+    /// Validation must have had nothing to say.
+    pub fn check(&self) {
+        let messages = self.device.validation_messages();
+        assert!(messages.is_empty(), "{messages:#?}");
+    }
+}
+
+/// Buffers on the device, for kernels of some features.
+pub struct Loaded {
+    features: Features,
+    bindings: Bindings,
+    buffers: Vec<(Slot, Buffer)>,
+}
+
+impl Loaded {
+    fn buffer(&self, slot: Slot) -> &Buffer {
+        let (_, buffer) = self.buffers.iter().find(|(s, _)| *s == slot).expect("the slot was bound");
+        buffer
+    }
 }
 
 /// A scene with what kernels read of it.
@@ -50,59 +140,20 @@ impl Case {
 }
 
 /// Buffers after a dispatch.
-pub struct Outputs(Vec<(Slot, Vec<u8>)>);
+pub struct Outputs(Loaded);
 
 impl Outputs {
     pub fn get<T: Pod>(&self, slot: Slot) -> Vec<T> {
-        let (_, bytes) = self.0.iter().find(|(s, _)| *s == slot).expect("the slot was bound");
-        bytemuck::pod_collect_to_vec(bytes)
+        bench().read(&self.0, slot)
     }
 }
 
 pub fn run(stem: &'static str, inputs: &Inputs, nodes: &[UVec4], step: &Step, buffers: &[(Slot, &[u8])]) -> Outputs {
-    let device = device();
-    let outputs = dispatch(&device, stem, inputs, nodes, step, buffers);
-    let messages = device.validation_messages();
-    assert!(messages.is_empty(), "{stem}: {messages:#?}");
-    outputs
-}
-
-fn dispatch(
-    device: &Device,
-    stem: &'static str,
-    inputs: &Inputs,
-    nodes: &[UVec4],
-    step: &Step,
-    buffers: &[(Slot, &[u8])],
-) -> Outputs {
-    let (_, spirv) = SPIRV.iter().find(|(name, _)| *name == stem).expect("the kernel exists");
-    let layout = Layout::new(device).expect("layout");
-    let kernel = Kernel::new(&layout, stem, spirv, &inputs.features, 64).expect("kernel");
-    let fixed: [(Slot, &[u8]); 9] = [
-        (Slot::Views, bytemuck::bytes_of(inputs.view)),
-        (Slot::Nodes, bytemuck::cast_slice(nodes)),
-        (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
-        (Slot::Shadings, bytemuck::cast_slice(inputs.shadings)),
-        (Slot::Materials, bytemuck::cast_slice(inputs.materials)),
-        (Slot::Lights, bytemuck::cast_slice(inputs.lights)),
-        (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
-        (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),
-        (Slot::Counters, &[0; 4]),
-    ];
-    let mut made = Vec::new();
-    for (slot, data) in fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty()) {
-        let buffer = Buffer::new(device, slot.name(), data.len() as u64, Location::Device).expect("buffer");
-        upload(device, &buffer, data).expect("upload");
-        made.push((slot, buffer));
-    }
-    let bound: Vec<_> = made.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
-    let bindings = Bindings::new(&layout, &bound).expect("bindings");
-    let mut recorder = Recorder::new(device).expect("recorder");
-    recorder.begin().expect("begin");
-    recorder.dispatch(&kernel, &bindings, step.pixel_count, step);
-    recorder.submit_and_wait().expect("submit");
-    let read = |buffer: &Buffer| download(device, buffer, buffer.bytes()).expect("download");
-    Outputs(made.iter().map(|(slot, buffer)| (*slot, read(buffer))).collect())
+    let mut bench = bench();
+    let loaded = bench.load(inputs, nodes, buffers);
+    bench.dispatch(stem, &loaded, step);
+    bench.check();
+    Outputs(loaded)
 }
 
 /// Asserts that the relative `errors` of all items are within 1e-5 but for one in a thousand, and those are few and finite.

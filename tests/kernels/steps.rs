@@ -1,6 +1,6 @@
 //! No invocation comes near the 65,535 loop trips after which Mesa 22 silently ends it.
 
-use crate::device;
+use crate::bench;
 use base64::Engine;
 use translucent::{LoadOptions, Renderer, Scene, Settings, reference::random::hash, shared::MAX_RAYS};
 
@@ -13,8 +13,8 @@ const LANES: u32 = 16;
 /// Largest number of steps of one traversal in a render.
 fn largest_step_count(scene: &Scene) -> u32 {
     let settings = Settings { resolution: Some((96, 96)), ..Settings::default() };
-    let device = device();
-    let mut renderer = Renderer::counting(&device, scene, &settings).expect("the renderer is made");
+    let bench = bench();
+    let mut renderer = Renderer::counting(&bench.device, scene, &settings).expect("the renderer is made");
     renderer.render(8).expect("renders");
     renderer.largest_step_count().expect("the counter is read")
 }

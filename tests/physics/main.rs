@@ -1,6 +1,7 @@
 //! The twins against truths that they do not contain: closed forms, quadrature, an independent integrator. No GPU.
 
 mod boundary;
+#[path = "../common/mod.rs"]
 mod common;
 mod density;
 mod edge;

@@ -1,6 +1,7 @@
 //! The analytic sphere: the area within a chord r is pi r^2 at every point, so under uniform light every point shows the
 //! same value, the profile's mass within 2R. Twins are fed with xo and n and with the sphere's own hits.
 
+use crate::common::sphere::*;
 use crate::common::*;
 use glam::{DVec3, dvec3};
 use rayon::prelude::*;
@@ -14,26 +15,6 @@ use translucent::reference::sample::sample;
 use translucent::reference::step;
 use translucent::shared::*;
 
-/// The cameras: at 3R, at 50R, orthographic.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Eye {
-    At(f64),
-    Infinite,
-}
-
-impl Eye {
-    /// Angle between the silhouette and the camera's axis [degrees].
-    fn silhouette(self) -> f64 {
-        match self {
-            Eye::At(distance) => (1.0 / distance).acos().to_degrees(),
-            Eye::Infinite => 90.0,
-        }
-    }
-}
-
-const ALBEDO: f64 = 0.95;
-const IOR: f64 = 1.3;
-
 /// A unit sphere seen at `angle` [degrees] from the camera's axis, z. Triangle 0 is tangent at xo; accumulate's are put
 /// behind it.
 struct Ball {
@@ -45,13 +26,8 @@ struct Ball {
 impl Ball {
     fn new(material: Material, projection: u32, pixels: u32, eye: Eye, angle: f64) -> Ball {
         let mut world = World::new(material, projection, pixels);
-        match eye {
-            Eye::At(distance) => world.look(DVec3::Z * distance, DVec3::ZERO, 1.0),
-            Eye::Infinite => world.look_along(-DVec3::Z, DVec3::ZERO, 3.0, 1.0),
-        }
-        let (sin, cos) = angle.to_radians().sin_cos();
-        // Out of the symmetric plane.
-        let position = dvec3(sin * 0.8, sin * 0.6, cos).normalize();
+        eye.look(&mut world);
+        let position = place(angle);
         world.triangle(tangent(position));
         let surface = Surface { position: position.as_vec3(), triangle: 0, barycentric: glam::Vec2::ZERO };
         Ball { world, surface, position }
@@ -59,24 +35,14 @@ impl Ball {
 
     /// The sphere's hits of a probe, in order, and the world that has a tangent triangle at each.
     fn hits(&self, probe: &Probe, world: &mut World) -> Hits {
-        let origin = self.position + probe.offset.as_dvec3();
-        let direction = probe.direction.as_dvec3();
         world.triangles.truncate(1);
         world.shadings.truncate(1);
         let mut hits = Hits::default();
-        let middle = -origin.dot(direction);
-        let half = 1.0 - (origin + middle * direction).length_squared();
-        if probe.t_min > probe.t_max || half < 0.0 {
-            return hits;
-        }
-        for t in [middle - half.sqrt(), middle + half.sqrt()] {
-            let given = self.world.features.projection == PROJECTION_CAMERA && hits.count == 1;
-            if t >= probe.t_min.into() && t <= probe.t_max.into() && !given {
-                hits.t[hits.count as usize] = t as f32;
-                hits.triangle[hits.count as usize] = hits.count + 1;
-                hits.count += 1;
-                world.triangle(tangent((origin + t * direction).normalize()));
-            }
+        for (t, point) in meetings(self.position, probe, self.world.features.projection) {
+            hits.t[hits.count as usize] = t as f32;
+            hits.triangle[hits.count as usize] = hits.count + 1;
+            hits.count += 1;
+            world.triangle(tangent(point));
         }
         hits
     }
@@ -106,32 +72,10 @@ impl Ball {
     }
 }
 
-/// A small triangle that is tangent to the unit sphere at its first corner.
-fn tangent(at: DVec3) -> [DVec3; 3] {
-    let (x, y) = at.any_orthonormal_pair();
-    let out = if x.cross(y).dot(at) > 0.0 { 1.0 } else { -1.0 };
-    [at, at + 1e-3 * x, at + 1e-3 * out * y]
-}
-
-/// What every point of the sphere shows under radiance 1, over Ft(wo).
-fn flat(sigma_tr: f64) -> f64 {
-    let (sigma_s, sigma_a) = coefficients(sigma_tr, ALBEDO);
-    Dipole::new(sigma_s, sigma_a, IOR).cdf(2.0)
-}
-
 #[test]
 fn uniform_light_shows_a_flat_disk() {
-    let mut cases = Vec::new();
-    for eye in [Eye::At(3.0), Eye::At(50.0), Eye::Infinite] {
-        for sigma_tr in [0.5, 5.0, 30.0, 100.0] {
-            for share in [0.0, 0.5, 0.9] {
-                cases.push((eye, sigma_tr, share * eye.silhouette()));
-            }
-            for before in [5.0, 1.0, 0.2] {
-                cases.push((eye, sigma_tr, eye.silhouette() - before));
-            }
-        }
-    }
+    let of_eye = |eye: Eye| SIGMAS.into_iter().flat_map(move |s| eye.angles().map(|angle| (eye, s, angle)));
+    let cases: Vec<_> = EYES.into_iter().flat_map(of_eye).collect();
     cases.into_par_iter().for_each(|(eye, sigma_tr, angle)| {
         let ball = Ball::new(matter(sigma_tr, ALBEDO, IOR, Energy), PROJECTION_MIS, 64, eye, angle);
         // 1e-6 of the energy is outside the ball; f32 positions of a probe are 1e-7 of R.

@@ -1,4 +1,6 @@
-//! Scenes for the twins, and means with their standard errors.
+//! Scenes for the twins and for single kernels, and means with their standard errors.
+
+pub mod sphere;
 
 use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
