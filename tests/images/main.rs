@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod integrator;
+mod lights;
 mod repeatable;
 mod scenes;
 mod statistics;

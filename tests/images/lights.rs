@@ -1,0 +1,275 @@
+//! Lights, environments and cameras through the whole renderer, against closed forms.
+
+use crate::{
+    channel, mean_and_error, render,
+    scenes::{Eye, Mesh, gltf, matter, scene},
+};
+use glam::{DVec3, Vec3};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+use translucent::{
+    Scene, Settings,
+    scene::{Environment, EnvironmentMap, LoadOptions},
+};
+
+/// Diffuse reflectance of [`plaster`].
+const WHITE: f64 = 0.5;
+
+/// An opaque material without a highlight near the normal: F0 = 0.
+fn plaster() -> Value {
+    json!({"pbrMetallicRoughness": {"baseColorFactor": [WHITE, WHITE, WHITE, 1.0], "metallicFactor": 0.0},
+        "extensions": {"KHR_materials_ior": {"ior": 1.0}}})
+}
+
+/// A square in z = 0 that faces +z.
+fn square(half: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.quad(DVec3::new(-half, -half, 0.0), DVec3::X * 2.0 * half, DVec3::Y * 2.0 * half);
+    mesh
+}
+
+/// Looks at the origin from +z, so narrowly that all of the picture is the origin.
+fn from_above(distance: f64) -> Eye {
+    Eye { eye: DVec3::Z * distance, at: DVec3::ZERO, lens: 1e-6 }
+}
+
+fn settings() -> Settings {
+    Settings { resolution: Some((4, 4)), seed: 3, ..Settings::default() }
+}
+
+/// Mean and standard error of a channel over independent pixels.
+fn mean(scene: &Scene, settings: &Settings, samples: u32, name: &str) -> (f64, f64) {
+    let image = render(scene, settings, samples);
+    let values: Vec<f64> = channel(&image, name).iter().map(|&x| f64::from(x)).collect();
+    mean_and_error(&values)
+}
+
+#[test]
+fn lamps_have_the_radiance_of_their_units() {
+    let lamp = |extra: Value| {
+        let mut light = json!({"type": "point", "intensity": 1.0});
+        light.as_object_mut().expect("an object").extend(extra.as_object().expect("an object").clone());
+        light
+    };
+    let at = DVec3::new(0.0, 0.0, 2.0);
+    let spot = |angle: f64, inner: f64, outer: f64| {
+        let light = lamp(json!({"type": "spot", "spot": {"innerConeAngle": inner, "outerConeAngle": outer}}));
+        (light, at, at - DVec3::new(angle.sin(), 0.0, angle.cos()))
+    };
+    // KHR_lights_punctual, as its text has it.
+    let cone = |angle: f64, inner: f64, outer: f64| {
+        let scale = 1.0 / f64::max(0.001, inner.cos() - outer.cos());
+        let factor = (angle.cos() * scale - outer.cos() * scale).clamp(0.0, 1.0);
+        factor * factor / 4.0
+    };
+    let oblique = DVec3::new(0.0, 3f64.sqrt(), 1.0);
+    let mut cases = vec![
+        ((lamp(json!({})), at, DVec3::ZERO), 0.25),
+        ((lamp(json!({"intensity": 3.0, "color": [0.25, 0.25, 0.25]})), at, DVec3::ZERO), 0.75 * 0.25),
+        ((lamp(json!({"range": 3.0})), at, DVec3::ZERO), 0.25 * (1.0 - (2.0f64 / 3.0).powi(4))),
+        ((lamp(json!({"range": 1.9})), at, DVec3::ZERO), 0.0),
+        // 1 W/sr at sqrt(8) m, 45 degrees from the normal.
+        ((lamp(json!({})), DVec3::new(2.0, 0.0, 2.0), DVec3::ZERO), 0.5f64.sqrt() / 8.0),
+        ((lamp(json!({"type": "directional", "intensity": 2.0})), oblique, DVec3::ZERO), 1.0),
+    ];
+    for angle in [0.0, 0.19, 0.25, 0.35, 0.41] {
+        cases.push((spot(angle, 0.2, 0.4), cone(angle, 0.2, 0.4)));
+    }
+    // An edge narrower than the least width.
+    cases.push((spot(0.3, 0.3, 0.3001), cone(0.3, 0.3, 0.3001)));
+    // All at once; each gives between 1 % and 30 % of the sum, or nothing.
+    let expected: f64 = cases
+        .iter()
+        .map(|((_, position, _), irradiance)| {
+            // Schlick's term with F0 = 0 takes a little from oblique light.
+            let half = (position.normalize() + DVec3::Z).normalize().z;
+            irradiance * WHITE / PI * (1.0 - (1.0 - half).powi(5))
+        })
+        .sum();
+    // The square alone; beside a translucent ball that sets another internal scale; in centimetres.
+    for (unit, ball) in [(1.0, None), (1.0, Some(0.01)), (0.01, None), (0.01, Some(3.0))] {
+        let size = 1.0 / unit;
+        let mut meshes = vec![(square(5.0 * size), 0)];
+        if let Some(radius) = ball {
+            let mut ball = Mesh::sphere(radius * size, 4);
+            ball.positions.iter_mut().for_each(|p| p.x += 60.0 * size);
+            meshes.push((ball, 1));
+        }
+        let lights: Vec<_> = cases
+            .iter()
+            .map(|((light, position, towards), _)| {
+                // A range is a length, intensities are not.
+                let mut light = light.clone();
+                if let Some(range) = light["range"].as_f64() {
+                    light["range"] = json!(range * size);
+                }
+                (light, *position * size, *towards * size)
+            })
+            .collect();
+        let file = gltf(&meshes, &[plaster(), matter([1.0; 3], [1.0; 3], 1.3)], &lights, &from_above(10.0 * size));
+        let options = LoadOptions { unit, ..LoadOptions::default() };
+        let scene = Scene::from_bytes("test.gltf", file.to_string().as_bytes(), &options).expect("valid");
+        let (found, _) = mean(&scene, &settings(), 1, "R");
+        assert!((found - expected).abs() <= 1e-3 * expected, "{unit} {ball:?}: {found}, not {expected}");
+    }
+}
+
+/// The direction of image coordinates (u, v).
+fn direction(u: f64, v: f64) -> DVec3 {
+    let (phi, theta) = (2.0 * PI * (u - 0.5), PI * v);
+    DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin())
+}
+
+fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environment {
+    let radiance = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| Vec3::splat(texel(x, y)));
+    let map = EnvironmentMap::Image { width, height, radiance: radiance.collect() };
+    Environment { map, ..Environment::default() }
+}
+
+#[test]
+fn environment_image_lies_as_documented() {
+    let bright = image(8, 4, |x, y| if (x, y) == (5, 1) { 7.0 } else { 1.0 });
+    let towards = direction(5.5 / 8.0, 1.5 / 4.0);
+    // Centre of the image at +X, columns towards +Z, rows from +Y.
+    assert!(towards.x > 0.0 && towards.y > 0.0 && towards.z > 0.0);
+    let quarter = DVec3::new(towards.z, towards.y, -towards.x);
+    for (rotation, scale, towards) in [(0.0, 1.0, towards), (90.0, 0.5, quarter), (-270.0, 3.0, quarter)] {
+        let environment = Environment { rotation, scale, ..bright.clone() };
+        // Seen beside the scene.
+        let eye = Eye { eye: DVec3::ZERO, at: towards, lens: 1e-3 };
+        let mut behind = square(1.0);
+        behind.positions.iter_mut().for_each(|p| *p -= 5.0 * towards);
+        let mut open = scene(&gltf(&[(behind, 0)], &[plaster()], &[], &eye));
+        open.set_environment(environment.clone()).expect("valid");
+        let (found, _) = mean(&open, &Settings { show_environment: true, ..settings() }, 1, "R");
+        assert!((found - 7.0 * scale).abs() < 0.01 * scale, "{rotation}: {found}");
+        // Mirrored by a smooth surface in its direction: F x radiance.
+        let mut mesh = square(1.0);
+        let turn = glam::DQuat::from_rotation_arc(DVec3::Z, towards);
+        mesh.positions.iter_mut().for_each(|p| *p = turn * *p);
+        mesh.normals.iter_mut().for_each(|n| *n = turn * *n);
+        let eye = Eye { eye: towards * 10.0, at: DVec3::ZERO, lens: 1e-3 };
+        let mut mirror = scene(&gltf(&[(mesh.clone(), 0)], &[matter([1.0; 3], [1.0; 3], 1.5)], &[], &eye));
+        mirror.set_environment(environment.clone()).expect("valid");
+        let (found, _) = mean(&mirror, &Settings { directions: 3, ..settings() }, 2, "reflection.R");
+        assert!((found - 7.0 * scale * 0.04).abs() < 1e-3 * scale, "{rotation}: {found}");
+        // And lit by it: more than by the rest alone.
+        let mut lit = scene(&gltf(&[(mesh, 0)], &[plaster()], &[], &eye));
+        lit.set_environment(environment).expect("valid");
+        let (found, error) = mean(&lit, &settings(), 64, "R");
+        assert!(found > 1.2 * WHITE * scale + 4.0 * error, "{rotation}: {found} +- {error}");
+    }
+}
+
+#[test]
+fn a_tiny_sun_lights_as_its_directional_light() {
+    // One texel of 128 x 64 is 1e5 times as bright as the rest; the lookup is bilinear, so it shines as a tent.
+    let (width, height, sun_x, sun_y) = (128u32, 64u32, 41u32, 13u32);
+    let environment = image(width, height, |x, y| if (x, y) == (sun_x, sun_y) { 1e5 } else { 1.0 });
+    let towards = direction((f64::from(sun_x) + 0.5) / f64::from(width), (f64::from(sun_y) + 0.5) / f64::from(height));
+    let mut mesh = square(50.0);
+    let turn = glam::DQuat::from_rotation_arc(DVec3::Z, DVec3::new(0.3, 1.0, 0.2).normalize());
+    mesh.positions.iter_mut().for_each(|p| *p = turn * *p);
+    mesh.normals.iter_mut().for_each(|n| *n = turn * *n);
+    let normal = turn * DVec3::Z;
+    let eye = Eye { eye: normal * 10.0, at: DVec3::ZERO, lens: 1e-3 };
+    // Solid angle of the tent, and the irradiance of it and of the rest.
+    let solid: f64 = 2.0 * PI / f64::from(width) * PI / f64::from(height) * towards.y.acos().sin();
+    let irradiance = solid * 1e5;
+    for material in [plaster(), matter([9.0; 3], [1.0; 3], 1.3)] {
+        let opaque = material["extras"].is_null();
+        let file = |lights: &[(Value, DVec3, DVec3)]| gltf(&[(mesh.clone(), 0)], std::slice::from_ref(&material), lights, &eye);
+        let light = json!({"type": "directional", "intensity": irradiance});
+        let mut expected = scene(&file(&[(light, towards, DVec3::ZERO)]));
+        expected.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
+        let mut found = scene(&file(&[]));
+        found.set_environment(environment.clone()).expect("valid");
+        let name = if opaque { "reflection.R" } else { "subsurface.R" };
+        let settings = Settings { resolution: Some((32, 32)), directions: 8, ..settings() };
+        let (expected, expected_error) = mean(&expected, &settings, 64, name);
+        let (found, error) = mean(&found, &settings, 64, name);
+        let error = error.hypot(expected_error);
+        assert!((found - expected).abs() < 4.0 * error, "{found} +- {error}, not {expected}");
+        assert!(error < 0.0025 * expected, "no force: {found} +- {error}, {expected}");
+    }
+}
+
+#[test]
+fn matter_of_any_density_has_its_radiance() {
+    // A wide slab of a million to 1e12 mean free paths: E_perp = pi, n = 1.3, alpha' = .95, view along the normal.
+    let golden = 0.418_550_831;
+    let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
+    let mut mesh = Mesh::default();
+    mesh.cuboid(DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 0.0), 3);
+    mesh.positions.iter_mut().for_each(|p| *p = turn * *p);
+    mesh.normals.iter_mut().for_each(|n| *n = turn * *n);
+    let up = turn * DVec3::Z;
+    let sun = json!({"type": "directional", "intensity": PI});
+    for sigma_t in [1e3, 1e5, 3e6, 1e9, 1e12] {
+        let materials = [matter([0.95 * sigma_t; 3], [0.05 * sigma_t; 3], 1.3)];
+        let eye = Eye { eye: up * 5.0, at: turn * DVec3::new(0.2, 0.1, 0.0), lens: 1e-3 };
+        let scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, &[(sun.clone(), up, DVec3::ZERO)], &eye));
+        let (found, error) = mean(&scene, &Settings { resolution: Some((16, 16)), ..settings() }, 32, "subsurface.G");
+        assert!(error < 0.01, "{sigma_t}: {found} +- {error}");
+        assert!((found - golden).abs() < 4.0 * error + 1e-3, "{sigma_t}: {found} +- {error}");
+    }
+}
+
+#[test]
+fn a_wide_ground_does_not_shade_itself() {
+    // A tilted ground a thousand times as wide as the translucent ball on it.
+    let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
+    let mut ground = Mesh::default();
+    ground.quad(DVec3::new(-1e3, -1e3, 0.0), DVec3::X * 2e3, DVec3::Y * 2e3);
+    ground.positions.iter_mut().for_each(|p| *p = turn * *p);
+    ground.normals.iter_mut().for_each(|n| *n = turn * *n);
+    let up = turn * DVec3::Z;
+    let materials = [plaster(), matter([1.0; 3], [1.0; 3], 1.3)];
+    let place = turn * DVec3::new(500.0, 300.0, 0.0);
+    let eye = Eye { eye: place + up * 100.0, at: place, lens: 0.5 };
+    let sun = json!({"type": "directional", "intensity": PI});
+    let light = (sun, up, DVec3::ZERO);
+    let scene = scene(&gltf(&[(ground, 0), (Mesh::sphere(1.0, 4), 1)], &materials, &[light], &eye));
+    let (found, _) = mean(&scene, &Settings { resolution: Some((32, 32)), ..settings() }, 1, "R");
+    // Schlick's term at up to 20 degrees from the normal, half of that for the half vector: below 1e-8.
+    assert!((found - WHITE).abs() < 1e-4, "{found}");
+}
+
+#[test]
+fn a_ball_inside_out_looks_the_same() {
+    // Wound inward with normals that point outward, and mirrored by its node.
+    let lamp = || (json!({"type": "point", "intensity": 50.0}), DVec3::new(2.0, 3.0, 4.0), DVec3::ZERO);
+    let eye = Eye { eye: DVec3::new(0.0, 0.0, 5.0), at: DVec3::ZERO, lens: 0.5 };
+    let materials = [matter([5.0; 3], [0.5; 3], 1.3)];
+    let image_of = |mesh: &Mesh, mirrored: bool| {
+        let mut file = gltf(&[(mesh.clone(), 0)], &materials, &[lamp()], &eye);
+        if mirrored {
+            file["nodes"][0]["scale"] = json!([-1.0, 1.0, 1.0]);
+        }
+        let image = render(&scene(&file), &Settings { resolution: Some((16, 16)), ..settings() }, 32);
+        channel(&image, "subsurface.G").iter().map(|&x| f64::from(x)).sum::<f64>()
+    };
+    let ball = Mesh::sphere(1.0, 8);
+    let mut inverted = ball.clone();
+    inverted.indices.chunks_exact_mut(3).for_each(|t| t.swap(1, 2));
+    let expected = image_of(&ball, false);
+    assert!(expected > 1.0);
+    for (name, found) in [("inverted", image_of(&inverted, false)), ("mirrored", image_of(&ball, true))] {
+        assert!((found / expected - 1.0).abs() < 0.02, "{name}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn nearly_smooth_surfaces_stay_finite() {
+    for roughness in [1e-2, 1e-4, 1e-5, 1e-8] {
+        let mut material = matter([5.0; 3], [0.5; 3], 1.5);
+        material["extras"]["bssrdf"]["surface"] = json!("rough");
+        material["pbrMetallicRoughness"] = json!({"roughnessFactor": roughness});
+        let lamp = (json!({"type": "point", "intensity": 1.0}), DVec3::Z * 3.0, DVec3::ZERO);
+        let mut scene = scene(&gltf(&[(square(1.0), 0)], &[material], &[lamp], &from_above(3.0)));
+        scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
+        scene.lights[0].intensity = DVec3::ZERO;
+        let (found, _) = mean(&scene, &settings(), 8, "reflection.R");
+        assert!((found - 0.04).abs() < 1e-4, "{roughness}: {found}");
+    }
+}
