@@ -132,7 +132,11 @@ impl<'r, 'a> Meshes<'r, 'a> {
                     against += usize::from(authored.dot(geometric) < 0.0);
                     *normal = authored.as_vec3();
                 }
-                self.opposed += u64::from(against == 3);
+                if against == 3 {
+                    // The winding says where the matter is.
+                    normals = normals.map(|normal| -normal);
+                    self.opposed += 1;
+                }
             }
             let material = primitive.material as u32;
             self.triangles.push(Triangle { corner, edge1, edge2, normals, material, set });
@@ -245,7 +249,8 @@ impl<'r, 'a> Meshes<'r, 'a> {
         if self.opposed > 0 {
             let inside_out = 2 * self.opposed > self.triangles.len() as u64;
             let guess = if inside_out { "; the file may be inside out" } else { "" };
-            warnings.push(format!("triangles whose normals point against their winding: {}{guess}", self.opposed));
+            let count = self.opposed;
+            warnings.push(format!("triangles whose normals point against their winding, and were turned: {count}{guess}"));
         }
         (self.triangles, self.sets, self.dropped)
     }
