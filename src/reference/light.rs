@@ -135,7 +135,8 @@ pub fn environment_cdf(radiance: &[Vec3], width: u32, height: u32) -> (Vec<f32>,
     let (columns, rows) = (width.min(DENSITY_LIMIT.0), height.min(DENSITY_LIMIT.1));
     // Bilinear lookup spreads a texel over its neighbours, whose own light may be nothing beside it.
     let parts = |cell: usize, cells: usize, texels: usize| {
-        let (begin, end) = (cell as f64 * texels as f64 / cells as f64, (cell + 1) as f64 * texels as f64 / cells as f64);
+        let (begin, end) =
+            (cell as f64 * texels as f64 / cells as f64, (cell + 1) as f64 * texels as f64 / cells as f64);
         (begin.floor() as i64 - 1..=end.ceil() as i64)
             .map(move |texel| (texel, tent(end - texel as f64 - 0.5) - tent(begin - texel as f64 - 0.5)))
             .filter(|(_, part)| *part > 0.0)

@@ -250,7 +250,8 @@ impl<'r, 'a> Meshes<'r, 'a> {
             let inside_out = 2 * self.opposed > self.triangles.len() as u64;
             let guess = if inside_out { "; the file may be inside out" } else { "" };
             let count = self.opposed;
-            warnings.push(format!("triangles whose normals point against their winding, and were turned: {count}{guess}"));
+            warnings
+                .push(format!("triangles whose normals point against their winding, and were turned: {count}{guess}"));
         }
         (self.triangles, self.sets, self.dropped)
     }

@@ -7,8 +7,13 @@ use crate::{
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 use translucent::{
-    Scene, Settings,
+    Renderer, Scene, Settings,
+    reference::{
+        boundary::{Side, diffuse_reflectance, transmittance},
+        profile::Dipole,
+    },
     scene::{Environment, EnvironmentMap, LoadOptions},
 };
 
@@ -178,7 +183,9 @@ fn a_tiny_sun_lights_as_its_directional_light() {
     let irradiance = solid * 1e5;
     for material in [plaster(), matter([9.0; 3], [1.0; 3], 1.3)] {
         let opaque = material["extras"].is_null();
-        let file = |lights: &[(Value, DVec3, DVec3)]| gltf(&[(mesh.clone(), 0)], std::slice::from_ref(&material), lights, &eye);
+        let file = |lights: &[(Value, DVec3, DVec3)]| {
+            gltf(&[(mesh.clone(), 0)], std::slice::from_ref(&material), lights, &eye)
+        };
         let light = json!({"type": "directional", "intensity": irradiance});
         let mut expected = scene(&file(&[(light, towards, DVec3::ZERO)]));
         expected.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
@@ -271,5 +278,158 @@ fn nearly_smooth_surfaces_stay_finite() {
         scene.lights[0].intensity = DVec3::ZERO;
         let (found, _) = mean(&scene, &settings(), 8, "reflection.R");
         assert!((found - 0.04).abs() < 1e-4, "{roughness}: {found}");
+    }
+}
+
+/// Share of uniform light that a GGX surface with height-correlated shadowing reflects at `cos`, by quadrature over the
+/// incoming directions; independent of the crate.
+fn reflected_share(alpha: f64, cos: f64, fresnel: impl Fn(f64) -> f64) -> f64 {
+    let wo = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+    let lambda = |c: f64| ((1.0 + alpha * alpha * (1.0 / (c * c) - 1.0)).sqrt() - 1.0) / 2.0;
+    let (rings, spokes) = (1500, 500);
+    let mut sum = 0.0;
+    for i in 0..rings {
+        let c = (f64::from(i) + 0.5) / f64::from(rings);
+        for j in 0..spokes {
+            let phi = PI * (f64::from(j) + 0.5) / f64::from(spokes);
+            let s = (1.0 - c * c).sqrt();
+            let half = (wo + DVec3::new(s * phi.cos(), s * phi.sin(), c)).normalize();
+            let d = alpha * alpha / PI / (half.z * half.z * (alpha * alpha - 1.0) + 1.0).powi(2);
+            sum += d * fresnel(half.dot(wo)) / (1.0 + lambda(cos) + lambda(c)) / (4.0 * cos);
+        }
+    }
+    sum * 2.0 * PI / f64::from(rings * spokes)
+}
+
+#[test]
+fn highlights_in_uniform_light_agree_with_quadrature() {
+    let dielectric = |c: f64| {
+        let refracted = (1.0 - (1.0 - c * c) / 2.25).sqrt();
+        let s = (c - 1.5 * refracted) / (c + 1.5 * refracted);
+        let p = (1.5 * c - refracted) / (1.5 * c + refracted);
+        (s * s + p * p) / 2.0
+    };
+    for (roughness, tilt) in [(0.4f64, 0.2f64), (0.7, 1.2), (1.0, 1.45)] {
+        let eye = Eye { eye: DVec3::new(0.0, -tilt.sin(), tilt.cos()) * 10.0, at: DVec3::ZERO, lens: 1e-4 };
+        let pbr = json!({"roughnessFactor": roughness, "metallicFactor": 1.0});
+        let metal = json!({"pbrMetallicRoughness": pbr});
+        let mut matter = matter([1.0; 3], [1.0; 3], 1.5);
+        matter["extras"]["bssrdf"]["surface"] = json!("rough");
+        matter["pbrMetallicRoughness"] = pbr;
+        for (material, share) in [
+            (metal, reflected_share(roughness * roughness, tilt.cos(), |_| 1.0)),
+            (matter, reflected_share(roughness * roughness, tilt.cos(), dielectric)),
+        ] {
+            assert!(share <= 1.0 + 1e-3);
+            let mut scene = scene(&gltf(&[(square(1.0), 0)], &[material], &[], &eye));
+            for environment in [Environment::constant(DVec3::ONE).expect("valid"), image(8, 4, |_, _| 1.0)] {
+                scene.set_environment(environment).expect("valid");
+                // 20 directions take three dispatches of a sample: none counts twice.
+                let settings = Settings { resolution: Some((16, 16)), directions: 20, ..settings() };
+                let (found, error) = mean(&scene, &settings, 8, "reflection.G");
+                let off = (found - share).abs();
+                assert!(off < 4.0 * error + 1e-3 * share, "{roughness} {tilt}: {found} +- {error}, not {share}");
+                assert!(error < 0.01 * share, "no force: {found} +- {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_range_of_samples_has_the_same_mean() {
+    // A ball on a table under a lamp and a sky with dark and bright texels: one sample, early or late, against many others.
+    let mut table = square(3.0);
+    table.positions.iter_mut().for_each(|p| p.z -= 1.0);
+    let mut skin = matter([2.0, 4.0, 6.0], [0.1, 0.5, 2.0], 1.3);
+    skin["extras"]["bssrdf"]["surface"] = json!("rough");
+    skin["pbrMetallicRoughness"] = json!({"roughnessFactor": 0.5});
+    let lamp = (json!({"type": "point", "intensity": 30.0}), DVec3::new(2.0, 1.0, 4.0), DVec3::ZERO);
+    let eye = Eye { eye: DVec3::new(0.0, -5.0, 2.0), at: DVec3::ZERO, lens: 0.5 };
+    let mut scene = scene(&gltf(&[(Mesh::sphere(1.0, 8), 0), (table, 1)], &[skin, plaster()], &[lamp], &eye));
+    scene.set_environment(image(8, 4, |x, y| if (x + y) % 3 == 0 { 2.0 } else { 0.0 })).expect("valid");
+    let device = crate::device();
+    let settings = Settings { resolution: Some((64, 64)), seed: 11, ..Settings::default() };
+    let mut renderer = Renderer::new(&device, &scene, &settings).expect("the renderer is made");
+    let mut image_of = |range: std::ops::Range<u32>| {
+        renderer.reset();
+        renderer.render_range(range, &mut |_| ControlFlow::Continue(())).expect("rendered");
+        renderer.image().expect("an image")
+    };
+    let many = image_of(100..228);
+    for range in [0..1, 1..2, 7..8, 33..34, 5..8] {
+        let few = image_of(range.clone());
+        for name in ["subsurface.R", "subsurface.B", "reflection.G", "A"] {
+            let pairs = channel(&few, name).iter().zip(channel(&many, name));
+            // Pixels are independent, and so are their differences.
+            let differences: Vec<f64> = pairs.map(|(a, b)| f64::from(a - b)).collect();
+            let (difference, error) = mean_and_error(&differences);
+            assert!(difference.abs() < 4.0 * error, "{range:?} {name}: {difference} +- {error}");
+        }
+    }
+}
+
+#[test]
+fn the_inside_of_a_ball_is_lit_by_a_lamp_in_its_middle() {
+    // From within, the outside of the matter is the room. All of the wall is lit alike, and the chords of a ball have the
+    // same lengths from both sides.
+    let dipole = Dipole::new(4.5, 0.5, 1.3);
+    let lamp = (json!({"type": "point", "intensity": 2.0}), DVec3::ZERO, DVec3::X);
+    let eye = Eye { eye: DVec3::new(0.3, 0.0, 0.0), at: DVec3::new(2.0, 0.0, 0.0), lens: 0.3 };
+    let mesh = Mesh::sphere(1.0, 40);
+    let scene = scene(&gltf(&[(mesh, 0)], &[matter([4.5; 3], [0.5; 3], 1.3)], &[lamp], &eye));
+    let (found, error) = mean(&scene, &Settings { resolution: Some((16, 16)), ..settings() }, 64, "subsurface.G");
+    let leaving = PI * (1.0 - diffuse_reflectance(1.3, Side::Outside));
+    // Seen at up to .1 rad: Ft changes by less than 1e-4. The mesh's area is 2e-3 below the ball's.
+    let expected = 2.0 * transmittance(1.3, 1.0).powi(2) * dipole.cdf(2.0) / leaving;
+    assert!((found - expected).abs() < 4.0 * error + 4e-3 * expected, "{found} +- {error}, not {expected}");
+    assert!(error < 5e-3 * expected, "no force: {found} +- {error}");
+}
+
+#[test]
+fn pixels_lie_where_the_lens_says() {
+    // A plane z = 0 behind a small ball; sizes of the picture that are not square.
+    let meshes = [(square(40.0), 0), (Mesh::sphere(1.0, 2), 1)];
+    let materials = [plaster(), matter([1.0; 3], [1.0; 3], 1.3)];
+    let (width, height) = (12u32, 8u32);
+    for (distance, lens) in [(5.0, 0.9f64), (5.0, -3.0), (1e5, 6e-5), (1.0, 2.0)] {
+        let centre = DVec3::new(8.0, 3.0, 0.0);
+        let eye = Eye { eye: centre + DVec3::Z * distance, at: centre, lens };
+        let scene = scene(&gltf(&meshes, &materials, &[], &eye));
+        let image = render(&scene, &Settings { resolution: Some((width, height)), ..settings() }, 1);
+        let half_height = if lens > 0.0 { distance * (lens / 2.0).tan() } else { -lens };
+        for (i, row) in (0..height).flat_map(|row| (0..width).map(move |column| (column, row))).enumerate() {
+            let (column, row) = row;
+            // Left is -x and up is +y.
+            let x = (2.0 * f64::from(column) + 1.0 - f64::from(width)) / f64::from(height) * half_height;
+            let y = (f64::from(height) - 2.0 * f64::from(row) - 1.0) / f64::from(height) * half_height;
+            let at = |name: &str| f64::from(channel(&image, name)[i]);
+            let found = DVec3::new(at("P.X"), at("P.Y"), at("P.Z"));
+            let wanted = centre + DVec3::new(x, y, 0.0);
+            // Internal coordinates reach 40: roundings of 4e-6.
+            assert!(found.distance(wanted) < 3e-5, "{distance} {lens} ({column}, {row}): {found}, not {wanted}");
+            assert!((at("Z") - distance).abs() < 1e-4 + 1e-7 * distance, "{}", at("Z"));
+        }
+    }
+}
+
+#[test]
+fn a_scene_without_camera_is_framed() {
+    let eye = Eye { eye: DVec3::Z, at: DVec3::ZERO, lens: 1.0 };
+    let mut ball = Mesh::sphere(2.0, 12);
+    ball.positions.iter_mut().for_each(|p| *p += DVec3::new(30.0, -7.0, 4.0));
+    let mut file = gltf(&[(ball, 0)], &[matter([1.0; 3], [1.0; 3], 1.3)], &[], &eye);
+    let nodes = file["nodes"].as_array_mut().expect("nodes");
+    nodes.pop();
+    file["scenes"][0]["nodes"] = json!([0]);
+    for (width, height) in [(40u32, 40u32), (60, 30), (30, 60)] {
+        let image = render(&scene(&file), &Settings { resolution: Some((width, height)), ..settings() }, 1);
+        let seen = |column: u32, row: u32| channel(&image, "material.Y")[(row * width + column) as usize] >= 0.0;
+        let edge = (0..width).any(|x| seen(x, 0) || seen(x, height - 1))
+            || (0..height).any(|y| seen(0, y) || seen(width - 1, y));
+        assert!(!edge, "{width} x {height}: the ball reaches the edge");
+        let covered = channel(&image, "material.Y").iter().filter(|&&m| m >= 0.0).count() as f64;
+        // A disk in a square with a margin of 5 %: pi / 4 / 1.05^2 = .71 of the smaller side's square.
+        let share = covered / f64::from(width.min(height).pow(2));
+        assert!((0.6..0.8).contains(&share), "{width} x {height}: {share}");
     }
 }
