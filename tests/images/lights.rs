@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use translucent::{
-    Renderer, Scene, Settings,
+    Projection, Renderer, Scene, Settings,
     reference::{
         boundary::{Side, diffuse_reflectance, transmittance},
         profile::Dipole,
@@ -431,5 +431,63 @@ fn a_scene_without_camera_is_framed() {
         // A disk in a square with a margin of 5 %: pi / 4 / 1.05^2 = .71 of the smaller side's square.
         let share = covered / f64::from(width.min(height).pow(2));
         assert!((0.6..0.8).contains(&share), "{width} x {height}: {share}");
+    }
+}
+
+#[test]
+fn uniform_light_leaves_matter_of_any_index() {
+    // Lo = Ft(wo) Rd Li; one channel scatters nothing, one absorbs nothing but for what the edge of the slab loses.
+    for (ior, tilt) in [(0.4, 0.2f64), (0.7, 0.5), (1.0, 1.5), (3.0, 1.2), (9.0, 0.0)] {
+        let mut mesh = Mesh::default();
+        mesh.cuboid(DVec3::new(-1e3, -1e3, -1e3), DVec3::new(1e3, 1e3, 0.0), 1);
+        let eye = Eye { eye: DVec3::new(0.0, -tilt.sin(), tilt.cos()) * 10.0, at: DVec3::ZERO, lens: 1e-4 };
+        let materials = [matter([0.0, 0.9, 1.0], [1.0, 0.1, 0.01], ior)];
+        let mut scene = scene(&gltf(&[(mesh, 0)], &materials, &[], &eye));
+        scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
+        let leaving = transmittance(ior, tilt.cos());
+        for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
+            let settings = Settings { resolution: Some((16, 16)), projection, ..settings() };
+            let image = render(&scene, &settings, 64);
+            let of = |name: &str| {
+                let values: Vec<f64> = channel(&image, name).iter().map(|&x| f64::from(x)).collect();
+                mean_and_error(&values)
+            };
+            assert_eq!(of("subsurface.R"), (0.0, 0.0));
+            for (name, sigma_s, sigma_a) in [("subsurface.G", 0.9, 0.1), ("subsurface.B", 1.0, 0.01)] {
+                let expected = leaving * Dipole::new(sigma_s, sigma_a, ior).total();
+                let (found, error) = of(name);
+                let problem = format!("{projection:?}, n = {ior}, {name}: {found} +- {error}, not {expected}");
+                assert!((found - expected).abs() < 4.0 * error + 1e-4 * expected, "{problem}");
+                assert!(error < 0.05 * expected, "no force: {problem}");
+            }
+        }
+    }
+}
+
+#[test]
+fn unlikely_places_stay_finite() {
+    // A lamp in the surface and one in the eye; normals that vanish, cancel within a triangle, or are not of unit length;
+    // the plane of a face through the eye; triangles wound at random.
+    let lamps = [DVec3::new(0.3, 0.2, 1.0), DVec3::new(0.0, -4.0, 1.0), DVec3::new(0.0, 0.0, 30.0)]
+        .map(|place| (json!({"type": "point", "intensity": 5.0}), place, DVec3::ZERO));
+    let mut broken = Mesh::default();
+    broken.cuboid(DVec3::splat(-1.0), DVec3::splat(1.0), 2);
+    for (i, normal) in broken.normals.iter_mut().enumerate() {
+        *normal *= [1.0, 0.0, -1.0, 1e-6, 1e6][i % 5];
+    }
+    broken.indices.chunks_exact_mut(3).step_by(3).for_each(|t| t.swap(0, 1));
+    let mut skin = matter([2.0, 4.0, 6.0], [0.1, 0.5, 2.0], 1.3);
+    skin["extras"]["bssrdf"]["surface"] = json!("rough");
+    skin["pbrMetallicRoughness"] = json!({"roughnessFactor": 0.3});
+    let eye = Eye { eye: DVec3::new(0.0, -4.0, 1.0), at: DVec3::new(0.0, 0.0, 1.0), lens: 0.8 };
+    for material in [skin, plaster()] {
+        let mut scene = scene(&gltf(&[(broken.clone(), 0)], &[material], &lamps, &eye));
+        scene.set_environment(image(4, 2, |x, y| if (x, y) == (1, 0) { 9.0 } else { 0.0 })).expect("valid");
+        for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
+            // No sample is invalid, as `render` checks.
+            let image = render(&scene, &Settings { resolution: Some((33, 33)), projection, ..settings() }, 16);
+            assert!(image.channels.iter().all(|channel| channel.data.iter().all(|value| value.is_finite())));
+            assert!(channel(&image, "R").iter().any(|&value| value > 0.0));
+        }
     }
 }
