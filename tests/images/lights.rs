@@ -138,7 +138,7 @@ fn environment_image_lies_as_documented() {
     // Centre of the image at +X, columns towards +Z, rows from +Y.
     assert!(towards.x > 0.0 && towards.y > 0.0 && towards.z > 0.0);
     let quarter = DVec3::new(towards.z, towards.y, -towards.x);
-    for (rotation, scale, towards) in [(0.0, 1.0, towards), (90.0, 0.5, quarter), (-270.0, 3.0, quarter)] {
+    for (rotation, scale, towards) in [(0.0, 1.0, towards), (-270.0, 3.0, quarter)] {
         let environment = Environment { rotation, scale, ..bright.clone() };
         // Seen beside the scene.
         let eye = Eye { eye: DVec3::ZERO, at: towards, lens: 1e-3 };
@@ -212,7 +212,7 @@ fn matter_of_any_density_has_its_radiance() {
     mesh.normals.iter_mut().for_each(|n| *n = turn * *n);
     let up = turn * DVec3::Z;
     let sun = json!({"type": "directional", "intensity": PI});
-    for sigma_t in [1e3, 1e5, 3e6, 1e9, 1e12] {
+    for sigma_t in [1e5, 3e6, 1e12] {
         let materials = [matter([0.95 * sigma_t; 3], [0.05 * sigma_t; 3], 1.3)];
         let eye = Eye { eye: up * 5.0, at: turn * DVec3::new(0.2, 0.1, 0.0), lens: 1e-3 };
         let scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, &[(sun.clone(), up, DVec3::ZERO)], &eye));
@@ -268,7 +268,7 @@ fn a_ball_inside_out_looks_the_same() {
 
 #[test]
 fn nearly_smooth_surfaces_stay_finite() {
-    for roughness in [1e-2, 1e-4, 1e-5, 1e-8] {
+    for roughness in [1e-4, 1e-8] {
         let mut material = matter([5.0; 3], [0.5; 3], 1.5);
         material["extras"]["bssrdf"]["surface"] = json!("rough");
         material["pbrMetallicRoughness"] = json!({"roughnessFactor": roughness});
@@ -309,7 +309,7 @@ fn highlights_in_uniform_light_agree_with_quadrature() {
         let p = (1.5 * c - refracted) / (1.5 * c + refracted);
         (s * s + p * p) / 2.0
     };
-    for (roughness, tilt) in [(0.4f64, 0.2f64), (0.7, 1.2), (1.0, 1.45)] {
+    for (roughness, tilt) in [(0.4f64, 0.2f64), (1.0, 1.4)] {
         let eye = Eye { eye: DVec3::new(0.0, -tilt.sin(), tilt.cos()) * 10.0, at: DVec3::ZERO, lens: 1e-4 };
         let pbr = json!({"roughnessFactor": roughness, "metallicFactor": 1.0});
         let metal = json!({"pbrMetallicRoughness": pbr});
@@ -437,7 +437,10 @@ fn a_scene_without_camera_is_framed() {
 #[test]
 fn uniform_light_leaves_matter_of_any_index() {
     // Lo = Ft(wo) Rd Li; one channel scatters nothing, one absorbs nothing but for what the edge of the slab loses.
-    for (ior, tilt) in [(0.4, 0.2f64), (0.7, 0.5), (1.0, 1.5), (3.0, 1.2), (9.0, 0.0)] {
+    use Projection::{Camera, Mis, Normal};
+    for (ior, tilt, projection) in
+        [(0.4, 0.2f64, Mis), (0.7, 0.5, Camera), (1.0, 1.5, Normal), (3.0, 1.2, Mis), (9.0, 0.0, Camera)]
+    {
         let mut mesh = Mesh::default();
         mesh.cuboid(DVec3::new(-1e3, -1e3, -1e3), DVec3::new(1e3, 1e3, 0.0), 1);
         let eye = Eye { eye: DVec3::new(0.0, -tilt.sin(), tilt.cos()) * 10.0, at: DVec3::ZERO, lens: 1e-4 };
@@ -445,21 +448,18 @@ fn uniform_light_leaves_matter_of_any_index() {
         let mut scene = scene(&gltf(&[(mesh, 0)], &materials, &[], &eye));
         scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
         let leaving = transmittance(ior, tilt.cos());
-        for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
-            let settings = Settings { resolution: Some((16, 16)), projection, ..settings() };
-            let image = render(&scene, &settings, 64);
-            let of = |name: &str| {
-                let values: Vec<f64> = channel(&image, name).iter().map(|&x| f64::from(x)).collect();
-                mean_and_error(&values)
-            };
-            assert_eq!(of("subsurface.R"), (0.0, 0.0));
-            for (name, sigma_s, sigma_a) in [("subsurface.G", 0.9, 0.1), ("subsurface.B", 1.0, 0.01)] {
-                let expected = leaving * Dipole::new(sigma_s, sigma_a, ior).total();
-                let (found, error) = of(name);
-                let problem = format!("{projection:?}, n = {ior}, {name}: {found} +- {error}, not {expected}");
-                assert!((found - expected).abs() < 4.0 * error + 1e-4 * expected, "{problem}");
-                assert!(error < 0.05 * expected, "no force: {problem}");
-            }
+        let image = render(&scene, &Settings { resolution: Some((16, 16)), projection, ..settings() }, 64);
+        let of = |name: &str| {
+            let values: Vec<f64> = channel(&image, name).iter().map(|&x| f64::from(x)).collect();
+            mean_and_error(&values)
+        };
+        assert_eq!(of("subsurface.R"), (0.0, 0.0));
+        for (name, sigma_s, sigma_a) in [("subsurface.G", 0.9, 0.1), ("subsurface.B", 1.0, 0.01)] {
+            let expected = leaving * Dipole::new(sigma_s, sigma_a, ior).total();
+            let (found, error) = of(name);
+            let problem = format!("{projection:?}, n = {ior}, {name}: {found} +- {error}, not {expected}");
+            assert!((found - expected).abs() < 4.0 * error + 1e-4 * expected, "{problem}");
+            assert!(error < 0.05 * expected, "no force: {problem}");
         }
     }
 }
@@ -480,6 +480,11 @@ fn unlikely_places_stay_finite() {
     skin["extras"]["bssrdf"]["surface"] = json!("rough");
     skin["pbrMetallicRoughness"] = json!({"roughnessFactor": 0.3});
     let eye = Eye { eye: DVec3::new(0.0, -4.0, 1.0), at: DVec3::new(0.0, 0.0, 1.0), lens: 0.8 };
+    // Normals that cancel along the middle row of pixels.
+    let corners = [DVec3::new(-1.0, -1.0, 1.5), DVec3::new(1.0, -1.0, 1.5), DVec3::new(0.0, 1.0, 1.5)];
+    broken.indices.extend([0, 1, 2].map(|i| broken.positions.len() as u32 + i));
+    broken.positions.extend(corners.map(|corner| DVec3::new(corner.x, -1.5, 1.0 + 0.2 * corner.y)));
+    broken.normals.extend([DVec3::NEG_Y, DVec3::NEG_Y, DVec3::Y]);
     for material in [skin, plaster()] {
         let mut scene = scene(&gltf(&[(broken.clone(), 0)], &[material], &lamps, &eye));
         scene.set_environment(image(4, 2, |x, y| if (x, y) == (1, 0) { 9.0 } else { 0.0 })).expect("valid");
