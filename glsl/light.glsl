@@ -47,9 +47,8 @@ vec2 environment_uv(View view, vec3 direction) {
 
 vec3 environment_texel(View view, int x, int y) {
     int w = int(view.environment_width);
-    x = x < 0 ? x + w : (x >= w ? x - w : x);
-    // Even if the direction is not a number.
-    x = clamp(x, 0, w - 1);
+    // No index leaves the image, whatever the direction.
+    x = clamp(x < 0 ? x + w : (x >= w ? x - w : x), 0, w - 1);
     y = clamp(y, 0, int(view.environment_height) - 1);
     return environment[y * w + x];
 }

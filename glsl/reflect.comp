@@ -62,7 +62,11 @@ void main() {
     } else {
         Shading shading = shadings[surface.triangle];
         Material m = materials[shading.material];
-        Seen s = seen(view, surface, triangles[surface.triangle], shading);
+        Triangle triangle = triangles[surface.triangle];
+        Seen s = seen(view, surface, triangle, shading);
+        // Positions round as the vertices do, and opaque surfaces may reach far beyond the unit ball.
+        vec3 extent = max(abs(triangle.corner), max(abs(triangle.edge1), abs(triangle.edge2)));
+        vec3 offset = s.normal * (SHADOW_OFFSET * max(1.0, max(extent.x, max(extent.y, extent.z))));
         bool translucent = (m.flags & TRANSLUCENT) != 0;
         float alpha = translucent ? m.alpha : max(m.alpha, OPAQUE_ALPHA_MIN);
         bool mirror = alpha == 0.0;
@@ -114,7 +118,7 @@ void main() {
                 }
             }
             open = open && light.x + light.y + light.z > 0.0;
-            traverse(Ray(s.position, s.normal * SHADOW_OFFSET, direction, 0.0, open ? distance : -1.0), ANY, EVERY_SET, 0u);
+            traverse(Ray(s.position, offset, direction, 0.0, open ? distance : -1.0), ANY, EVERY_SET, 0u);
             if (open && hit_count == 0u) radiance += light;
         }
         if (step_.first != 0) radiance += m.emission;

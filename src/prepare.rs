@@ -69,6 +69,14 @@ pub fn resolution(scene: &Scene, settings: &Settings) -> Result<(u32, u32)> {
     Ok((width, height))
 }
 
+/// Mean free paths that kernels resolve [internal units]. Below, the rounding of positions would move a hit by more than
+/// the profile is wide; above, its cubes leave f32. Matter outside is taken as one inside with the same albedo: its light
+/// moves by less than 1e-4 of the radius, or is as good as lost.
+const MEAN_FREE_PATH: (f64, f64) = (1.0 / (1 << 17) as f64, 1e9);
+
+/// GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
+const ALPHA_MIN: f64 = 1e-6;
+
 /// Longest side of an image [pixels].
 pub const MAX_SIDE: u32 = 65_536;
 
@@ -208,11 +216,17 @@ fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings
         None => Material::default(),
         Some(medium) => {
             // Coefficients per internal unit.
-            let sigma_s_prime = medium.sigma_s_prime / frame.scale;
-            let sigma_a = medium.sigma_a / frame.scale;
+            let (mut sigma_s_prime, mut sigma_a) = (medium.sigma_s_prime / frame.scale, medium.sigma_a / frame.scale);
+            let extinction = sigma_s_prime + sigma_a;
+            for channel in 0..3 {
+                if extinction[channel] > 0.0 {
+                    let kept = extinction[channel].clamp(1.0 / MEAN_FREE_PATH.1, 1.0 / MEAN_FREE_PATH.0);
+                    sigma_s_prime[channel] *= kept / extinction[channel];
+                    sigma_a[channel] *= kept / extinction[channel];
+                }
+            }
             let normalisation = settings.normalisation;
-            let mut out = profile::material(sigma_s_prime, sigma_a, material.ior, normalisation, settings.radius_tail);
-            out.flags = shared::TRANSLUCENT;
+            let out = profile::material(sigma_s_prime, sigma_a, material.ior, normalisation, settings.radius_tail);
             if settings.projection == Projection::Camera && out.component_cdf[5] > 0.0 && out.camera_rate <= 0.0 {
                 let problem = format!(
                     "camera needs sigma_tr > 0 in every channel, but material \"{}\" ({}) absorbs nothing in one; use mis or normal",
@@ -224,7 +238,8 @@ fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings
         }
     };
     out.ior = material.ior as f32;
-    out.alpha = (material.roughness * material.roughness) as f32;
+    let alpha = material.roughness * material.roughness;
+    out.alpha = if alpha < ALPHA_MIN { 0.0 } else { alpha as f32 };
     out.base_color = material.base_color.as_vec3();
     out.metallic = material.metallic as f32;
     out.emission = material.emission.as_vec3();

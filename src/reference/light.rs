@@ -4,7 +4,8 @@
 //! window max(1 - (d / range)^4, 0), and a spot's factor saturate(cosine * scale + offset)^2.
 //!
 //! Environment image: u = 1/2 + atan2(e_z, e_x) / 2 pi, v = acos(e_y) / pi, bilinear between texel centres, u periodic.
-//! Its density is constant within cells of (u, v), proportional to luminance x sin theta; a row comes from the marginal
+//! Its density is constant within cells of (u, v), proportional to the integral of luminance x sin theta over the cell, so
+//! that it is nowhere far below the light that the lookup finds there; a row comes from the marginal
 //! distribution and a column from the row's, both by inversion (M. Pharr, W. Jakob, G. Humphreys, "Physically Based
 //! Rendering", 3rd ed., section 14.2.4). Per solid angle it is p(u, v) / (2 pi^2 sin theta).
 
@@ -132,16 +133,20 @@ const DENSITY_LIMIT: (usize, usize) = (1024, 512);
 pub fn environment_cdf(radiance: &[Vec3], width: u32, height: u32) -> (Vec<f32>, u32, u32) {
     let (width, height) = (width as usize, height as usize);
     let (columns, rows) = (width.min(DENSITY_LIMIT.0), height.min(DENSITY_LIMIT.1));
-    // Texels may straddle cells: each counts with the part of it that lies inside.
+    // Bilinear lookup spreads a texel over its neighbours, whose own light may be nothing beside it.
     let parts = |cell: usize, cells: usize, texels: usize| {
-        let (begin, end) = (cell * texels, (cell + 1) * texels);
-        (begin / cells..end.div_ceil(cells))
-            .map(move |texel| (texel, (end.min((texel + 1) * cells) - begin.max(texel * cells)) as f64 / cells as f64))
+        let (begin, end) =
+            (cell as f64 * texels as f64 / cells as f64, (cell + 1) as f64 * texels as f64 / cells as f64);
+        (begin.floor() as i64 - 1..=end.ceil() as i64)
+            .map(move |texel| (texel, tent(end - texel as f64 - 0.5) - tent(begin - texel as f64 - 0.5)))
+            .filter(|(_, part)| *part > 0.0)
     };
     let weight = |row: usize, column: usize| {
         let mut sum = 0.0;
         for (j, part_j) in parts(row, rows, height) {
+            let j = j.clamp(0, height as i64 - 1) as usize;
             for (i, part_i) in parts(column, columns, width) {
+                let i = i.rem_euclid(width as i64) as usize;
                 sum += luminance(radiance[j * width + i].as_dvec3()) * part_i * part_j;
             }
         }
@@ -159,6 +164,12 @@ pub fn environment_cdf(radiance: &[Vec3], width: u32, height: u32) -> (Vec<f32>,
     let mut table = cumulative(&marginal);
     table.extend(conditional);
     (table, columns as u32, rows as u32)
+}
+
+/// Integral of max(1 - |x|, 0) up to `x`.
+fn tent(x: f64) -> f64 {
+    let rest = 1.0 - x.abs().min(1.0);
+    if x < 0.0 { rest * rest / 2.0 } else { 1.0 - rest * rest / 2.0 }
 }
 
 /// Cumulative sums from 0 to exactly 1; uniform where all weights are zero.

@@ -48,7 +48,11 @@ pub fn add_reflection(contribution: &Contribution, sums: &mut Sums) {
 fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen, lobe: &Lobe, k: u32) -> DVec3 {
     let point = surface.position.as_dvec3();
     let cosine = |wi: DVec3| if seen.normal.dot(wi) > 0.0 { lobe.normal.dot(wi).max(0.0) } else { 0.0 };
-    let visible = |wi: DVec3, distance: f64| visibility(inputs, point, seen.normal, wi, distance);
+    // Positions round as the vertices do, and opaque surfaces may reach far beyond the unit ball.
+    let triangle = &inputs.triangles[surface.triangle as usize];
+    let extent = triangle.corner.abs().max(triangle.edge1.abs()).max(triangle.edge2.abs()).max_element().max(1.0);
+    let lift = seen.normal * f64::from(extent);
+    let visible = |wi: DVec3, distance: f64| visibility(inputs, point, lift, wi, distance);
 
     if let Some(light) = inputs.lights.get(k as usize) {
         let incident = light::delta(light, point);

@@ -1,5 +1,6 @@
 //! Environments: constant, or a latitude-longitude image in .hdr or .exr.
 
+use super::frame::INTENSITY_MAX;
 use super::{Environment, EnvironmentMap};
 use crate::{Error, Result};
 use glam::{DVec3, Vec3};
@@ -81,6 +82,16 @@ impl Environment {
         }
         if !(self.scale.is_finite() && self.scale >= 0.0) {
             return wrong(format!("the scale is {}; it must be finite, not negative", self.scale));
+        }
+        let brightest = match &self.map {
+            EnvironmentMap::None => 0.0,
+            EnvironmentMap::Constant(radiance) => radiance.max_element(),
+            EnvironmentMap::Image { radiance, .. } => {
+                radiance.iter().fold(0.0, |most: f64, texel| most.max(texel.max_element().into()))
+            }
+        };
+        if brightest * self.scale > INTENSITY_MAX {
+            return wrong(format!("its radiance reaches {:e}; {INTENSITY_MAX:e} at most", brightest * self.scale));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::json::shorten;
 use super::mesh::Triangle;
-use super::{Camera, Frame, Light, LightKind, Material};
+use super::{Camera, Frame, Lens, Light, LightKind, Material};
 use crate::{Error, Result, shared};
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -11,8 +11,9 @@ use std::path::Path;
 const RADIUS_RANGE: (f64, f64) = (1e-12, 1e12);
 /// Largest internal coordinate: beyond it, f32 boxes and areas lose their meaning.
 const COORDINATE_MAX: f64 = 1e9;
-/// Largest intensity in internal units: sums over many samples stay far below f32's largest number.
-const INTENSITY_MAX: f64 = 1e30;
+/// Largest intensity, irradiance or radiance in internal units: sums over many samples stay far below f32's largest
+/// number.
+pub(super) const INTENSITY_MAX: f64 = 1e30;
 /// Least twice-area in internal units of which f32 can form a normal.
 const AREA_MIN: f64 = 1e-18;
 
@@ -91,7 +92,12 @@ pub(super) fn check_nodes(file: &Path, frame: &Frame, lights: &[Light], cameras:
         }
     }
     for camera in cameras {
-        if let Some(problem) = far(camera.eye) {
+        let wide = match camera.lens {
+            Lens::Perspective { .. } => false,
+            Lens::Orthographic { xmag, ymag } => xmag.max(ymag) * frame.scale > COORDINATE_MAX,
+        };
+        let wide = wide.then(|| format!("sees more than {COORDINATE_MAX:e} times the translucent part's radius"));
+        if let Some(problem) = far(camera.eye).or(wide) {
             return Err(Error::scene(file, format!("camera `{}`", shorten(&camera.name)), problem));
         }
     }

@@ -57,6 +57,9 @@ const COMPRESSIONS: &[&str] = &["KHR_draco_mesh_compression", "EXT_meshopt_compr
 /// Largest coordinate that a transform may give [units of the file].
 const COORDINATE_MAX: f64 = 1e30;
 
+/// Largest vertical angle of a camera [radians]: at pi, its picture would be infinitely wide.
+const YFOV_MAX: f64 = 3.14;
+
 /// Reads a whole file that lies (or would lie) at `file`.
 pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Raw> {
     let (json, binary) = split(file, bytes)?;
@@ -260,8 +263,8 @@ fn read_camera(
             let lens = item.need("perspective")?;
             let yfov = lens.need("yfov")?;
             let angle = yfov.positive()?;
-            if angle >= std::f64::consts::PI {
-                return Err(yfov.error(format!("must be below pi, is {angle}")));
+            if angle > YFOV_MAX {
+                return Err(yfov.error(format!("must be at most {YFOV_MAX}, is {angle}")));
             }
             let aspect = lens.get("aspectRatio")?.map(|aspect| aspect.positive()).transpose()?;
             Lens::Perspective { yfov: angle, aspect }

@@ -1,5 +1,6 @@
 //! Materials of a glTF file: surface factors, and the medium from presets, extras or extensions.
 
+use super::frame::INTENSITY_MAX;
 use super::json::Item;
 use super::medium::{self, Length, Mapping};
 use super::presets::{Preset, preset};
@@ -147,7 +148,7 @@ fn read_surface(item: &Item, material: &mut Material, warnings: &mut Vec<String>
     if let Some(extension) = item.extension("KHR_materials_emissive_strength")?
         && let Some(strength) = extension.get("emissiveStrength")?
     {
-        material.emission *= strength.within(0.0, f32::MAX as f64)?;
+        material.emission *= strength.within(0.0, INTENSITY_MAX)?;
     }
     if material.emission != DVec3::ZERO {
         warnings.push(item.note("emits light that is seen, but that does not yet light other surfaces"));

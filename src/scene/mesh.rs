@@ -57,8 +57,10 @@ pub(super) struct Meshes<'r, 'a> {
     triangles: Vec<Triangle>,
     sets: Vec<Set>,
     dropped: u64,
-    /// Triangles whose normals point against their winding.
+    /// Triangles whose normals all point against their winding.
     opposed: u64,
+    /// Vertices of triangles below which their normal points.
+    below: u64,
 }
 
 impl<'r, 'a> Meshes<'r, 'a> {
@@ -74,6 +76,7 @@ impl<'r, 'a> Meshes<'r, 'a> {
             sets: Vec::new(),
             dropped: 0,
             opposed: 0,
+            below: 0,
         })
     }
 
@@ -126,13 +129,20 @@ impl<'r, 'a> Meshes<'r, 'a> {
             };
             let mut normals = [geometric.as_vec3(); 3];
             if let Some(authored) = &primitive.normals {
-                let mut against = 0;
-                for (normal, corner) in normals.iter_mut().zip(order) {
-                    let authored = unit(normal_matrix * authored[corner]).unwrap_or(geometric);
-                    against += usize::from(authored.dot(geometric) < 0.0);
-                    *normal = authored.as_vec3();
+                let mut authored = order.map(|corner| unit(normal_matrix * authored[corner]).unwrap_or(geometric));
+                if authored.iter().all(|normal| normal.dot(geometric) < 0.0) {
+                    // The winding says where the matter is.
+                    authored = authored.map(|normal| -normal);
+                    self.opposed += 1;
                 }
-                self.opposed += u64::from(against == 3);
+                for (normal, authored) in normals.iter_mut().zip(authored) {
+                    // Normals on both sides of a triangle could cancel between its vertices.
+                    if authored.dot(geometric) > 0.0 {
+                        *normal = authored.as_vec3();
+                    } else {
+                        self.below += 1;
+                    }
+                }
             }
             let material = primitive.material as u32;
             self.triangles.push(Triangle { corner, edge1, edge2, normals, material, set });
@@ -245,7 +255,15 @@ impl<'r, 'a> Meshes<'r, 'a> {
         if self.opposed > 0 {
             let inside_out = 2 * self.opposed > self.triangles.len() as u64;
             let guess = if inside_out { "; the file may be inside out" } else { "" };
-            warnings.push(format!("triangles whose normals point against their winding: {}{guess}", self.opposed));
+            let count = self.opposed;
+            warnings
+                .push(format!("triangles whose normals point against their winding, and were turned: {count}{guess}"));
+        }
+        if self.below > 0 {
+            warnings.push(format!(
+                "vertex normals below their triangle were replaced by the triangle's own: {}",
+                self.below
+            ));
         }
         (self.triangles, self.sets, self.dropped)
     }

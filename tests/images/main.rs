@@ -4,6 +4,7 @@
 mod closed_forms;
 mod edge_cases;
 mod integrator;
+mod lights;
 mod repeatable;
 mod scenes;
 mod statistics;

@@ -131,9 +131,41 @@ fn environment_table_is_reduced_by_area() {
     let mut one = vec![Vec3::ZERO; 2048];
     one[7] = Vec3::ONE;
     let (table, _, _) = environment_cdf(&one, 2048, 1);
-    assert_eq!((table[2 + 3], table[2 + 4]), (0.0, 1.0), "texel 7 is in cell 3");
+    // As a tent of half width 1 about 7.5: an eighth of it lies beyond 8.
+    assert_eq!((table[2 + 3], table[2 + 4], table[2 + 5]), (0.0, 0.875, 1.0), "texel 7 is in cells 3 and 4");
     let (black, _, _) = environment_cdf(&[Vec3::ZERO; 8], 4, 2);
     assert_eq!(black, [0.0, 0.5, 1.0, 0.0, 0.25, 0.5, 0.75, 1.0, 0.0, 0.25, 0.5, 0.75, 1.0], "uniform");
+}
+
+#[test]
+fn environment_density_follows_the_bilinear_lookup() {
+    // Bright texels beside black ones, on the seam and at the pole too: radiance over density stays within that of a
+    // cell's mean over its corner, 16 with bilinear weights, and 2 more for sin theta within the row.
+    let (width, height) = (16, 8);
+    let mut radiance = vec![Vec3::ZERO; width * height];
+    for (x, y) in [(0, 0), (0, 4), (15, 6), (7, 3)] {
+        radiance[y * width + x] = Vec3::ONE;
+    }
+    let (mut world, _) = on_plane(PROJECTION_MIS);
+    install(&mut world, width as u32, height as u32, radiance);
+    let inputs = world.inputs();
+    let (mut total, mut worst) = (0.0, 0f64);
+    let (columns, lines) = (256, 256);
+    for i in 0..columns {
+        for j in 0..lines {
+            let (u, v) = ((f64::from(i) + 0.5) / f64::from(columns), (f64::from(j) + 0.5) / f64::from(lines));
+            let (phi, theta) = (TAU * (u - 0.5), PI * v);
+            let e = [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()];
+            let rows = [world.view.environment_row0, world.view.environment_row1, world.view.environment_row2];
+            let d = rows.iter().zip(e).map(|(row, e)| row.as_dvec3() * e).sum::<DVec3>();
+            let light = environment(&inputs, d).x;
+            total += light * 2.0 * PI * PI * theta.sin() / f64::from(columns * lines);
+            if light > 0.0 {
+                worst = worst.max(light / environment_pdf(&inputs, d));
+            }
+        }
+    }
+    assert!(worst < 32.0 * total, "{worst} of {total}");
 }
 
 #[test]

@@ -101,6 +101,11 @@ fn a_scene_checks_what_it_is_given() {
     let table = [
         (Environment { scale: -1.0, ..Environment::default() }, "the scale is -1"),
         (Environment { rotation: f64::NAN, ..Environment::default() }, "the rotation is NaN"),
+        (Environment { map: image(2, 1, 2), scale: 1e31, ..Environment::default() }, "its radiance reaches 1e31"),
+        (
+            Environment { map: EnvironmentMap::Constant(DVec3::X * 1e29), scale: 20.0, rotation: 0.0 },
+            "e30; 1e30 at most",
+        ),
         (Environment { map: image(3, 2, 5), ..Environment::default() }, "3 x 2 is not the size of 5 texels"),
         (Environment { map: image(0, 7, 0), ..Environment::default() }, "0 x 7 is not the size of 0 texels"),
     ];

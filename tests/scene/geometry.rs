@@ -173,6 +173,25 @@ fn mirrored_nodes_stay_outward() {
 }
 
 #[test]
+fn no_normal_points_below_its_triangle() {
+    // Between normals on both sides of a triangle there is one of length zero.
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let stored = |third: f32| [[0.0, 0.6, 0.8], [0.0, 0.0, 2.0], [0.6, 0.0, 0.8 * third]];
+    for (third, below) in [(1.0, 0), (-1.0, 1)] {
+        let mut json = with_bytes(&[corners, stored(third)].concat(), &[0, 1, 2]);
+        json["accessors"][0]["count"] = json!(3);
+        let normals = json!({"bufferView": 0, "byteOffset": 36, "componentType": 5126, "count": 3, "type": "VEC3"});
+        json["accessors"].as_array_mut().expect("accessors").push(normals);
+        json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(2);
+        let scene = load(&json);
+        let shading = scene.shadings[0];
+        assert!([shading.normal0, shading.normal1, shading.normal2].iter().all(|normal| normal.z > 0.5));
+        let warned = scene.warnings.iter().filter(|warning| warning.contains("below their triangle")).count();
+        assert_eq!(warned, below, "{:?}", scene.warnings);
+    }
+}
+
+#[test]
 fn normals_follow_the_surface() {
     // A sphere's points and normals under a non-uniform, mirrored, sheared transform: normals of an ellipsoid.
     let (mut positions, mut indices) = (Vec::new(), Vec::new());
