@@ -16,7 +16,7 @@ use std::{
 };
 use translucent::{
     CameraChoice, Device, DeviceOptions, Image, LoadOptions, Normalisation, Projection, Renderer, Scene, Settings,
-    image::check_writable,
+    image::{Attribute, check_writable},
     scene::{Environment, EnvironmentMap},
     shared::BATCHES,
 };
@@ -134,9 +134,11 @@ impl Render {
         bar.finish_and_clear();
         let seconds = start.elapsed().as_secs_f64();
         let samples = renderer.samples().len();
-        let mut image = renderer.image()?;
-        drop(renderer);
+        let mut image = renderer.finish()?;
         self.keep_asked(&mut image);
+        if let Some(Attribute::Integer(invalid @ 1..)) = image.attributes.get("translucent.invalidSamples") {
+            self.warn(&format!("contributions left out because they were not finite or negative: {invalid}"));
+        }
         image.write(&output)?;
         if let Some(png) = &self.png {
             image.write_png(png, self.exposure.unwrap_or(0.0))?;
@@ -166,6 +168,7 @@ impl Render {
                 return Err(Failure::input(format!("{}: its name must end in .{extension}", path.display())));
             }
             check_writable(path)?;
+            keep(&self.scene, path)?;
             if let Some(EnvironmentSource::File(environment)) = &self.environment {
                 keep(environment, path)?;
             }
@@ -183,6 +186,13 @@ impl Render {
         };
         for warning in &scene.warnings {
             self.warn(warning);
+        }
+        if !scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some()) {
+            let names: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+            let names = names.join(", ");
+            self.warn(&format!(
+                "no surface is translucent: give a material a preset with --material; there are: {names}"
+            ));
         }
         if environment.is_none() && scene.lights.is_empty() && scene.environment.map == EnvironmentMap::None {
             self.warn("no light in the scene and no --environment: a constant environment of radiance 1 is used");
