@@ -146,20 +146,26 @@ impl Channels {
         let light = pixel.subsurface + pixel.reflection;
         let position = centre.position.as_vec3();
         let mut values = Vec::with_capacity(self.list.len());
-        values.extend(light.to_array());
+        values.extend(light.to_array().map(stored));
         values.push(pixel.alpha);
-        values.extend(pixel.subsurface.to_array());
-        values.extend(pixel.reflection.to_array());
+        values.extend(pixel.subsurface.to_array().map(stored));
+        values.extend(pixel.reflection.to_array().map(stored));
         values.extend(centre.normal.to_array());
         values.extend(position.to_array());
         values.extend([centre.depth as f32, pixel.samples as f32, centre.material as f32]);
         if self.has_variance {
-            values.extend(pixel.variance.to_array());
+            values.extend(pixel.variance.to_array().map(stored));
         }
         for (channel, value) in self.list.iter_mut().zip(values) {
             channel.data.push(value);
         }
     }
+}
+
+/// Sums and squares of finite light can be more than f32 holds; the largest number stands for them, so that no hour of
+/// rendering ends without a file.
+fn stored(value: f32) -> f32 {
+    if value.is_finite() { value } else { f32::MAX }
 }
 
 fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {

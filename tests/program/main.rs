@@ -319,3 +319,28 @@ fn a_scene_without_translucent_matter_is_rendered_with_a_warning_that_names_its_
     assert!(!said("--material chalk=skin1").contains("translucent"));
     assert_eq!(said("--quiet"), "");
 }
+
+/// Radiance near the largest f32: sums and squares overflow.
+#[test]
+fn light_beyond_what_f32_holds_is_written_as_the_largest_number_with_a_warning() {
+    let folder = Folder::new("bright");
+    let output = folder.run("render SPOT --resolution 16x16 --samples 8 --environment constant:1e38,1,1e30 -o a.exr");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("not finite"), "{}", stderr(&output));
+    let image = folder.image("a.exr");
+    for channel in &image.channels {
+        assert!(channel.data.iter().all(|value| value.is_finite()), "{}", channel.name);
+    }
+    assert!(image.channel("variance.B").expect("contract").contains(&f32::MAX));
+    assert!(integer(&image, "invalidSamples") > 0);
+}
+
+#[test]
+fn negative_texels_of_an_environment_are_counted_in_a_warning() {
+    let folder = Folder::new("negative");
+    let texel = |x: usize, y: usize| if (x, y) == (3, 1) { (-0.001f32, 0.0, 0.0) } else { (1.0, 1.0, 1.0) };
+    exr::prelude::write_rgb_file(folder.join("light.exr"), 8, 4, texel).expect("writable");
+    let output = folder.run("render SPOT --resolution 8x8 --samples 1 --environment light.exr -o a.exr");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("1 texels of negative radiance"), "{}", stderr(&output));
+}
