@@ -1,4 +1,67 @@
-//! translucent renders translucent matter in glTF scenes with raw Vulkan compute.
+//! translucent renders translucent matter (marble, skin, milk, wax) in glTF scenes with raw Vulkan compute.
+//!
+//! ```
+//! # fn main() -> translucent::Result<()> {
+//! # let folder = std::env::temp_dir().join(format!("translucent-{}", std::process::id()));
+//! # std::fs::create_dir_all(&folder).map_err(|error| translucent::Error::File { file: folder.clone(), problem: error.to_string() })?;
+//! # let output = folder.join("spot.exr");
+//! use translucent::{Device, DeviceOptions, Renderer, Scene, Settings};
+//!
+//! let device = Device::open(&DeviceOptions::default())?;
+//! let scene = Scene::load("assets/spot.glb")?;
+//! # let mut scene = scene;
+//! # scene.set_environment(translucent::Environment::constant(glam::DVec3::ONE)?)?;
+//! let settings = Settings { resolution: Some((16, 16)), ..Settings::default() };
+//! let mut renderer = Renderer::new(&device, &scene, &settings)?;
+//! renderer.render(64)?;
+//! renderer.image()?.write(&output)?;
+//! # let image = translucent::Image::read(&output)?;
+//! # assert_eq!((image.width, image.height), (16, 16));
+//! # assert!(image.channel("subsurface.G").is_some_and(|light| light[8 * 16 + 8] > 0.1));
+//! # let _ = std::fs::remove_dir_all(&folder);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # How data flows
+//!
+//! ```text
+//! file ─ scene ─► Scene ── prepare ─► Features ──────────────────────────────► kernels, specialised
+//!   (checked, f64 metres;  (f32,      Nodes Triangles Shadings Materials
+//!    geometry centred and   internal  Lights Environment EnvironmentCdf ─────► buffers   per scene
+//!    scaled)                units)    View ──────────────────────────────────► buffer    per render
+//!
+//!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
+//!   primary                       sample         reproject       accumulate, reflect             resolve
+//!   └► Surfaces[pixel, batch]     └► Probes      └► HitLists     └► RunningSums, BatchSums       └► Pixels ─► Image
+//! ```
+//!
+//! Each word with a capital is a buffer or a struct that [`shared`] defines once for Rust and GLSL. Each kernel is
+//! `glsl/<stem>.comp`; its twin in f64, with the mathematics and where it comes from, is `reference::<stem>`.
+//!
+//! *What changes how often decides where it lives.* Per scene: buffers made and filled once. Per render: `View`, and the
+//! features, which are specialization constants. Per sample: [`shared::Step`], in push constants. So a sample allocates
+//! nothing and uploads nothing.
+//!
+//! *Bands.* An image with more pixels than [`Settings::band_pixels`] is cut into bands of rows. They take turns on the
+//! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
+//! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups.
+//!
+//! # What may use what
+//!
+//! | module | may use | holds |
+//! | --- | --- | --- |
+//! | [`shared`] | nothing | every struct, buffer, constant and feature that Rust and GLSL share |
+//! | [`error`] | nothing | [`Error`]: file, item and problem, or the step |
+//! | [`settings`] | `shared` | [`Settings`]: what a caller may choose |
+//! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
+//! | [`reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
+//! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
+//! | [`prepare`] | `scene`, `settings`, `shared`, `reference` | [`Scene`] and [`Settings`] to what kernels read |
+//! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
+//! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image |
+//!
+//! The program uses this public interface alone. There is no global state: devices and renderers stand side by side.
 
 pub mod error;
 pub mod gpu;

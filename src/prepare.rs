@@ -82,7 +82,7 @@ pub const MAX_SIDE: u32 = 65_536;
 
 /// Checks the settings against the scene and fills the shared structs.
 ///
-/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions or projection cannot be had.
+/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions, projection or environment cannot be had.
 pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let (width, height) = resolution(scene, settings)?;
     let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, width, height]);
@@ -130,6 +130,11 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
             (shared::ENVIRONMENT_IMAGE, radiance.clone(), table)
         }
     };
+
+    if !view.environment_scale.is_finite() {
+        let problem = format!("its radiance times the scale {} is more than a kernel's number holds", map.scale);
+        return Err(Error::setting("environment", problem));
+    }
 
     let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some() == flag);
     let emits = scene.materials.iter().any(|m| m.emission != DVec3::ZERO);

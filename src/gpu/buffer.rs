@@ -233,9 +233,15 @@ pub fn upload(device: &Device, buffer: &Buffer, data: &[u8]) -> Result<()> {
 /// If the buffer is shorter.
 pub fn download(device: &Device, buffer: &Buffer, bytes: u64) -> Result<Vec<u8>> {
     let mut data = vec![0; bytes as usize];
+    download_to(device, buffer, &mut data)?;
+    Ok(data)
+}
+
+/// Fills `data` from the start of `buffer`, wherever it is. Errors and panics as [`download`].
+pub fn download_to(device: &Device, buffer: &Buffer, data: &mut [u8]) -> Result<()> {
     if buffer.memory.mapped.is_some() {
-        buffer.read_at(0, &mut data);
-        return Ok(data);
+        buffer.read_at(0, data);
+        return Ok(());
     }
     with_staging(device, |staging| {
         for (i, piece) in data.chunks_mut(STAGING_BYTES as usize).enumerate() {
@@ -246,6 +252,5 @@ pub fn download(device: &Device, buffer: &Buffer, bytes: u64) -> Result<Vec<u8>>
             staging.readback.read_at(0, piece);
         }
         Ok(())
-    })?;
-    Ok(data)
+    })
 }

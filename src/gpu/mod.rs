@@ -12,7 +12,7 @@ mod instance;
 mod kernel;
 mod recorder;
 
-pub use buffer::{Buffer, Location, download, upload};
+pub use buffer::{Buffer, Location, download, download_to, upload};
 pub use device::{Device, DeviceOptions};
 pub use instance::{DeviceInfo, DeviceKind, ValidationLog};
 pub use kernel::{Bindings, Kernel, Layout};

@@ -86,6 +86,10 @@ impl Image {
     /// samples; the variance of the mean is the sum of w^2 times each part's, and is left out if a part has none.
     /// Normals, positions, depths and materials come from the first. The order of `parts` does not matter.
     ///
+    /// An interrupted part of several bands may have pixels with up to 32 samples more than its range says
+    /// (`samples.Y`). They are samples of the part that follows too, and count twice: the mean stays unbiased, the
+    /// noise is a little more than that many independent samples would leave.
+    ///
     /// # Errors
     /// [`Error::File`] if parts overlap, leave a gap, or differ in scene, settings, seed, kernels, version, size or
     /// channels.

@@ -3,8 +3,9 @@
 use super::{Failure, INTERRUPTED, arguments, arguments::EnvironmentSource, keep, print};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::{
+    fmt,
     ops::{ControlFlow, Range},
     path::PathBuf,
     process::ExitCode,
@@ -16,7 +17,7 @@ use std::{
 };
 use translucent::{
     CameraChoice, Device, DeviceOptions, Image, LoadOptions, Normalisation, Projection, Renderer, Scene, Settings,
-    image::check_writable,
+    image::{Attribute, check_writable},
     scene::{Environment, EnvironmentMap},
     shared::BATCHES,
 };
@@ -128,15 +129,20 @@ impl Render {
         let bar = self.bar();
         let start = Instant::now();
         let finished = renderer.render_range(self.samples.clone(), &mut |progress| {
-            show(&bar, progress.done, progress.total, &self.samples, start);
+            if bar.length() != Some(progress.total) {
+                bar.set_length(progress.total);
+            }
+            bar.set_position(progress.done);
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         bar.finish_and_clear();
         let seconds = start.elapsed().as_secs_f64();
         let samples = renderer.samples().len();
-        let mut image = renderer.image()?;
-        drop(renderer);
+        let mut image = renderer.finish()?;
         self.keep_asked(&mut image);
+        if let Some(Attribute::Integer(invalid @ 1..)) = image.attributes.get("translucent.invalidSamples") {
+            self.warn(&format!("samples left out because they were not finite or negative: {invalid}"));
+        }
         image.write(&output)?;
         if let Some(png) = &self.png {
             image.write_png(png, self.exposure.unwrap_or(0.0))?;
@@ -166,6 +172,7 @@ impl Render {
                 return Err(Failure::input(format!("{}: its name must end in .{extension}", path.display())));
             }
             check_writable(path)?;
+            keep(&self.scene, path)?;
             if let Some(EnvironmentSource::File(environment)) = &self.environment {
                 keep(environment, path)?;
             }
@@ -181,8 +188,12 @@ impl Render {
             Some(EnvironmentSource::File(file)) => Some(Environment::load(file)?),
             None => None,
         };
-        for warning in &scene.warnings {
-            self.warn(warning);
+        if !scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some()) {
+            let names: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+            let names = names.join(", ");
+            self.warn(&format!(
+                "no surface is translucent: give a material a preset with --material; there are: {names}"
+            ));
         }
         if environment.is_none() && scene.lights.is_empty() && scene.environment.map == EnvironmentMap::None {
             self.warn("no light in the scene and no --environment: a constant environment of radiance 1 is used");
@@ -192,6 +203,10 @@ impl Render {
             environment.rotation = self.environment_rotation.unwrap_or(0.0);
             environment.scale = self.environment_scale.unwrap_or(1.0);
             scene.set_environment(environment)?;
+        }
+        // Only now: some are about the environment.
+        for warning in &scene.warnings {
+            self.warn(warning);
         }
         Ok(scene)
     }
@@ -232,20 +247,20 @@ impl Render {
         if self.quiet {
             return ProgressBar::hidden();
         }
-        // Draws to stderr, and nothing where that is no terminal.
-        let bar = ProgressBar::new(0);
-        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}  {eta} left");
-        style.map_or(bar.clone(), |style| bar.with_style(style))
+        let samples = self.samples.len();
+        // Computed from the position, so that a line never shows two moments.
+        let status = move |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let done = state.pos() as f64;
+            let each = done / state.len().unwrap_or(1).max(1) as f64 * samples as f64;
+            let rate = done / state.elapsed().as_secs_f64().max(1e-9) * 1e-6;
+            // A line that cannot be drawn is no reason to stop.
+            let _ = write!(out, "{each:.0}/{samples} samples  {rate:.3} Msamples/s");
+        };
+        // Draws to stderr, and nothing where that is no terminal. Without a length it would be drawn full.
+        let bar = ProgressBar::new(1);
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {status}  {eta} left");
+        style.map_or(bar.clone(), |style| bar.with_style(style.with_key("status", status)))
     }
-}
-
-/// Samples of each pixel and pixel samples per second, beside the bar.
-fn show(bar: &ProgressBar, done: u64, total: u64, samples: &Range<u32>, start: Instant) {
-    let rate = done as f64 / start.elapsed().as_secs_f64().max(1e-9) * 1e-6;
-    let each = done as f64 / total.max(1) as f64 * samples.len() as f64;
-    bar.set_message(format!("{each:.0}/{} samples  {rate:.3} Msamples/s", samples.len()));
-    bar.set_length(total);
-    bar.set_position(done);
 }
 
 /// A flag that the first Ctrl-C sets; the second ends the program at once.

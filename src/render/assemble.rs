@@ -1,25 +1,35 @@
 //! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it. Every value is
 //! finite: what exceeds f32 is its largest number.
 
-use super::{Renderer, spirv_hash};
+use super::{Film, Renderer, spirv_hash};
 use crate::{
     error::Result,
-    gpu::download,
+    gpu::{Buffer, download_to},
     image::{Attribute, Channel, Image},
-    shared::{BATCHES, MISS, Pixel, Slot, Step, Surface},
+    shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
 };
 use glam::{DVec3, Vec3};
 use std::collections::BTreeMap;
 
+/// What becomes of the sums when an image is made of them.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Sums {
+    Kept,
+    Freed,
+}
+
 /// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z, samples,
-/// material. Leaves the sums as they are.
-pub fn image(renderer: &mut Renderer) -> Result<Image> {
+/// material.
+pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     let view = renderer.prepared.view;
     let rows = renderer.prepared.rows.clone();
     let count = (view.crop_width * (rows.end - rows.start)) as usize;
     let range = renderer.samples();
     let has_variance = renderer.prepared.features.batches != 0 && range.end - range.start >= BATCHES;
 
+    // The device has the geometry already, so the host need not keep it while rendering.
+    let geometry =
+        Geometry { triangles: whole(renderer, Slot::Triangles)?, shadings: whole(renderer, Slot::Shadings)? };
     let mut channels = Channels::new(count, has_variance);
     let mut invalid = 0u64;
     for band in 0..renderer.bands.len() {
@@ -41,11 +51,15 @@ pub fn image(renderer: &mut Renderer) -> Result<Image> {
         recorder.dispatch(&kernels.resolve, bindings, pixels, &step);
         recorder.dispatch(&kernels.primary, bindings, pixels, &step);
         recorder.submit_and_wait()?;
-        let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels)?;
-        let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels)?;
+        let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
+        let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
         for (pixel, surface) in resolved.iter().zip(&surfaces) {
             invalid += u64::from(pixel.invalid);
-            channels.push(pixel, &centre(renderer, surface));
+            channels.push(pixel, &centre(renderer, &geometry, surface));
+        }
+        if sums == Sums::Freed {
+            renderer.resident = None;
+            renderer.bands[band].film = Film::Empty;
         }
     }
     Ok(Image {
@@ -58,10 +72,23 @@ pub fn image(renderer: &mut Renderer) -> Result<Image> {
     })
 }
 
-fn read<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot, pixels: u32) -> Result<Vec<T>> {
+fn read<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot, count: usize) -> Result<Vec<T>> {
     let Some(buffer) = renderer.buffer(slot) else { return Ok(vec![]) };
-    let bytes = download(&renderer.device, buffer, u64::from(pixels) * slot.stride() as u64)?;
-    Ok(bytemuck::pod_collect_to_vec(&bytes))
+    let mut elements = vec![T::zeroed(); count];
+    download_to(&renderer.device, buffer, bytemuck::cast_slice_mut(&mut elements))?;
+    Ok(elements)
+}
+
+/// All elements of a slot.
+fn whole<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result<Vec<T>> {
+    let bytes = renderer.buffer(slot).map_or(0, Buffer::bytes) as usize;
+    read(renderer, slot, bytes / size_of::<T>())
+}
+
+/// The scene's triangles.
+struct Geometry {
+    triangles: Vec<Triangle>,
+    shadings: Vec<Shading>,
 }
 
 /// What the middle of a pixel shows.
@@ -75,15 +102,15 @@ struct Centre {
     material: i32,
 }
 
-fn centre(renderer: &Renderer, surface: &Surface) -> Centre {
+fn centre(renderer: &Renderer, geometry: &Geometry, surface: &Surface) -> Centre {
     if surface.triangle == MISS {
         return Centre { normal: Vec3::ZERO, position: DVec3::ZERO, depth: 0.0, material: -1 };
     }
-    let triangle = &renderer.scene.triangles[surface.triangle as usize];
-    let shading = &renderer.scene.shadings[surface.triangle as usize];
+    let triangle = &geometry.triangles[surface.triangle as usize];
+    let shading = &geometry.shadings[surface.triangle as usize];
     let [b1, b2] = surface.barycentric.to_array();
     let normal = (shading.normal0 * (1.0 - b1 - b2) + shading.normal1 * b1 + shading.normal2 * b2).normalize();
-    let frame = renderer.scene.frame;
+    let frame = renderer.frame;
     let position = surface.position.as_dvec3() / frame.scale + frame.centre;
     let camera = &renderer.prepared.camera;
     // Towards the eye, as the kernels turn it.
@@ -121,20 +148,26 @@ impl Channels {
         let light = (pixel.subsurface + pixel.reflection).min(Vec3::MAX);
         let position = centre.position.as_vec3();
         let mut values = Vec::with_capacity(self.list.len());
-        values.extend(light.to_array());
+        values.extend(light.to_array().map(stored));
         values.push(pixel.alpha);
-        values.extend(pixel.subsurface.to_array());
-        values.extend(pixel.reflection.to_array());
+        values.extend(pixel.subsurface.to_array().map(stored));
+        values.extend(pixel.reflection.to_array().map(stored));
         values.extend(centre.normal.to_array());
         values.extend(position.to_array());
         values.extend([centre.depth as f32, pixel.samples as f32, centre.material as f32]);
         if self.has_variance {
-            values.extend(pixel.variance.to_array());
+            values.extend(pixel.variance.to_array().map(stored));
         }
         for (channel, value) in self.list.iter_mut().zip(values) {
             channel.data.push(value);
         }
     }
+}
+
+/// Sums and squares of finite light can be more than f32 holds; the largest number stands for them, so that no hour of
+/// rendering ends without a file.
+fn stored(value: f32) -> f32 {
+    if value.is_finite() { value } else { f32::MAX }
 }
 
 fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
@@ -156,12 +189,13 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         ("samples", Attribute::Integer((range.end - range.start) as i32)),
         ("sampleBegin", Attribute::Integer(range.start as i32)),
         ("sampleEnd", Attribute::Integer(range.end as i32)),
-        ("seed", Attribute::Integer(settings.seed as i32)),
+        // EXR has no unsigned integers.
+        ("seed", Attribute::Text(settings.seed.to_string())),
         ("version", Attribute::Text(env!("CARGO_PKG_VERSION").into())),
         ("spirvHash", Attribute::Text(spirv_hash())),
         ("device", Attribute::Text(info.name.clone())),
         ("driver", Attribute::Text(info.driver.clone())),
-        ("sceneHash", Attribute::Text(renderer.scene.hash.clone())),
+        ("sceneHash", Attribute::Text(renderer.scene_hash.clone())),
         ("settings", Attribute::Text(described.to_string())),
         ("invalidSamples", Attribute::Integer(invalid.min(i32::MAX as u64) as i32)),
     ];

@@ -9,7 +9,7 @@ use crate::{
     image::Image,
     prepare::{Prepared, prepare},
     reference::random,
-    scene::Scene,
+    scene::{Frame, Scene},
     settings::Settings,
     shared::{BATCHES, Features, MAX_RAYS, STRATUM, Slot, Step},
 };
@@ -61,7 +61,9 @@ pub struct Progress {
 /// Renders one scene with one set of settings. Samples add up over calls until [`Renderer::reset`].
 pub struct Renderer {
     device: Device,
-    scene: Scene,
+    frame: Frame,
+    /// [`Scene::hash`].
+    scene_hash: String,
     settings: Settings,
     prepared: Prepared,
     kernels: Kernels,
@@ -124,7 +126,8 @@ impl Renderer {
         let bindings = Bindings::new(&layout, &bound)?;
         Ok(Renderer {
             device: device.clone(),
-            scene: scene.clone(),
+            frame: scene.frame,
+            scene_hash: scene.hash.clone(),
             settings: settings.clone(),
             prepared,
             kernels,
@@ -150,7 +153,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// The samples that every pixel has; some may have up to 32 more after an interruption.
+    /// The samples that every pixel has. After an interruption some bands of several may have up to 32 more: those
+    /// samples count in their means and variances, and their number is in the image's channel `samples.Y`.
     pub fn samples(&self) -> Range<u32> {
         let begin = self.begin.unwrap_or(0);
         begin..self.bands.iter().map(|band| band.end).min().unwrap_or(begin)
@@ -290,7 +294,13 @@ impl Renderer {
     /// The image of the samples so far, with every channel and attribute. Every value is finite: a mean or variance beyond
     /// f32 is its largest number, and samples that would overflow a sum are left out and counted (`invalidSamples`).
     pub fn image(&mut self) -> Result<Image> {
-        assemble::image(self)
+        assemble::image(self, assemble::Sums::Kept)
+    }
+
+    /// As [`Renderer::image`], for the last time: each band's sums are freed once they are read, so that a large image
+    /// needs the memory of its sums and not that of its channels on top.
+    pub fn finish(mut self) -> Result<Image> {
+        assemble::image(&mut self, assemble::Sums::Freed)
     }
 
     /// The largest number of loop trips of any traversal so far; 0 unless made by [`Renderer::counting`].

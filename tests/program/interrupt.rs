@@ -1,4 +1,4 @@
-//! Ctrl-C: the first writes what there is, the second ends the program.
+//! Ctrl-C, or a polite `kill`: the first writes what there is, the second ends the program.
 #![cfg(unix)]
 
 use crate::{Folder, integer, stderr};
@@ -19,8 +19,8 @@ fn start(folder: &Folder, words: &str) -> Child {
     child
 }
 
-fn interrupt(child: &Child) {
-    let status = Command::new("sh").arg("-c").arg(format!("kill -INT {}", child.id())).status();
+fn signal(name: &str, child: &Child) {
+    let status = Command::new("sh").arg("-c").arg(format!("kill -{name} {}", child.id())).status();
     assert!(status.expect("there is a shell").success());
 }
 
@@ -40,11 +40,13 @@ fn end(mut child: Child) -> Output {
 #[test]
 fn the_first_writes_a_whole_image_of_the_samples_so_far() {
     let folder = Folder::new("interrupt");
-    let child = start(&folder, &format!("render SPOT --resolution 24x24 {ENDLESS}"));
-    interrupt(&child);
-    let output = end(child);
-    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
-    assert_eq!(folder.files(), ["out.exr"]);
+    for name in ["INT", "TERM"] {
+        let child = start(&folder, &format!("render SPOT --resolution 24x24 {ENDLESS}"));
+        signal(name, &child);
+        let output = end(child);
+        assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+        assert_eq!(folder.files(), ["out.exr"]);
+    }
     let image = folder.image("out.exr");
     let samples = integer(&image, "samples");
     assert!(samples >= 1);
@@ -61,9 +63,9 @@ fn the_second_ends_the_program_without_a_file() {
     let folder = Folder::new("abort");
     // A single sample of so many pixels takes software Vulkan seconds, and a GPU cannot finish either.
     let child = start(&folder, &format!("render SPOT --resolution 4096x4096 --directions 1000 {ENDLESS}"));
-    interrupt(&child);
+    signal("INT", &child);
     sleep(Duration::from_millis(200));
-    interrupt(&child);
+    signal("TERM", &child);
     let output = end(child);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert_eq!(folder.files(), [] as [&str; 0]);

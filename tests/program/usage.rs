@@ -10,6 +10,7 @@ fn wrong_usage_and_input_end_with_2_and_a_message_and_leave_nothing() {
     fs::write(folder.join("garbage.glb"), b"glTF, but not really").expect("writable");
     fs::write(folder.join("empty.gltf"), b"{}").expect("writable");
     fs::write(folder.join("text.hdr"), b"no image").expect("writable");
+    fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/spot.glb"), folder.join("scene.exr")).expect("writable");
     fs::write(folder.join("light.exr"), b"an environment").expect("writable");
     let before = folder.files();
     for (words, expected) in [
@@ -48,6 +49,10 @@ fn wrong_usage_and_input_end_with_2_and_a_message_and_leave_nothing() {
         ("render SPOT --environment constant:1,1,-1", "constant:R,G,B"),
         ("render SPOT --environment constant:1,1,1 --environment-scale -1", "--environment-scale"),
         ("render SPOT --environment light.exr -o light.exr", "overwritten"),
+        ("render scene.exr", "overwritten"),
+        ("render scene.exr -o ./scene.exr", "overwritten"),
+        ("render SPOT --environment constant:1e39,1,1", "environment"),
+        ("render SPOT --environment constant:1e30,1,1 --environment-scale 1e30", "environment"),
         ("render SPOT --environment-rotation 90", "--environment"),
         ("render SPOT --exposure 1", "--png"),
         ("render SPOT --seed -1", "--seed"),
