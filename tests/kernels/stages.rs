@@ -268,7 +268,7 @@ fn resolve_gives_the_twins_pixel() {
     };
     // Numbers of many magnitudes, from a hash; for every tenth pixel near the end of f32.
     let number = |i: u32| 10f32.powf((reference::random::hash(i) % 4000) as f32 / 1000.0 - 2.0);
-    let greatness = |i: u32| if i % pixels % 10 == 0 { 3e36 } else { 1.0 };
+    let greatness = |i: u32| if (i % pixels).is_multiple_of(10) { 3e36 } else { 1.0 };
     let vector = |i: u32| Vec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2)) * greatness(i);
     let sums: Vec<Sums> = (0..pixels)
         .map(|i| Sums {
