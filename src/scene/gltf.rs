@@ -58,7 +58,7 @@ const COMPRESSIONS: &[&str] = &["KHR_draco_mesh_compression", "EXT_meshopt_compr
 const COORDINATE_MAX: f64 = 1e30;
 
 /// Largest vertical angle of a camera [radians]: at pi, its picture would be infinitely wide.
-const YFOV_MAX: f64 = 3.14;
+const YFOV_MAX: f64 = 3.13;
 
 /// Reads a whole file that lies (or would lie) at `file`.
 pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Raw> {

@@ -496,3 +496,22 @@ fn unlikely_places_stay_finite() {
         }
     }
 }
+
+#[test]
+fn a_very_far_eye_sees_what_an_orthographic_one_does() {
+    let lamp = (json!({"type": "point", "intensity": 30.0}), DVec3::new(2.0, 1.0, 4.0), DVec3::ZERO);
+    let far = 1e5;
+    for projection in [Projection::Mis, Projection::Camera] {
+        let values = [(10.0, -1.2), (far, 2.4 / far)].map(|(distance, lens)| {
+            let eye = Eye { eye: DVec3::Z * distance, at: DVec3::ZERO, lens };
+            let materials = [matter([5.0; 3], [0.5; 3], 1.3)];
+            let scene = scene(&gltf(&[(Mesh::sphere(1.0, 8), 0)], &materials, std::slice::from_ref(&lamp), &eye));
+            let image = render(&scene, &Settings { resolution: Some((32, 32)), projection, ..settings() }, 16);
+            channel(&image, "subsurface.G").iter().map(|&x| f64::from(x)).collect::<Vec<_>>()
+        });
+        // The same samples: they differ by what f32 and the last 1e-5 rad make of them.
+        let total: f64 = values[0].iter().sum();
+        let difference: f64 = values[0].iter().zip(&values[1]).map(|(a, b)| (a - b).abs()).sum();
+        assert!(total > 1.0 && difference < 5e-3 * total, "{projection:?}: {difference} of {total}");
+    }
+}
