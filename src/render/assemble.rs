@@ -60,6 +60,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         if sums == Sums::Freed {
             renderer.resident = None;
             renderer.bands[band].film = Film::Empty;
+            renderer.bands[band].sums = Default::default();
         }
     }
     Ok(Image {

@@ -19,15 +19,18 @@ pub struct Band {
     /// End of the samples in its sums.
     pub end: u32,
     pub film: Film,
+    /// RunningSums and BatchSums as bytes, if they are on the host. Allocated once: bands that take turns would leave the
+    /// allocator holes that it does not give back.
+    pub sums: [Vec<u8>; 2],
 }
 
-/// A band's sums.
+/// Where a band's sums are.
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Film {
     /// No sample yet.
     Empty,
     OnDevice,
-    /// RunningSums and BatchSums as bytes.
-    OnHost([Vec<u8>; 2]),
+    OnHost,
 }
 
 /// The buffers with elements for each pixel of a band that a render needs.
@@ -71,7 +74,7 @@ pub fn split(device: &Device, prepared: &Prepared, settings: &Settings) -> Resul
             let edge = |band: u32| (u64::from(rows) * u64::from(band) / u64::from(count)) as u32;
             let (first, end) = (edge(band), edge(band + 1));
             let pixels = (end - first) * width;
-            Band { first_row: prepared.rows.start + first, pixels, end: 0, film: Film::Empty }
+            Band { first_row: prepared.rows.start + first, pixels, end: 0, film: Film::Empty, sums: Default::default() }
         })
         .collect())
 }

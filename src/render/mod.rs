@@ -5,7 +5,7 @@ mod bands;
 
 use crate::{
     error::{Error, Result},
-    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
+    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, download_to, upload},
     image::Image,
     prepare::{Prepared, prepare},
     reference::random,
@@ -225,9 +225,10 @@ impl Renderer {
         self.recorder.begin()?;
         for (index, slot) in SUMS.into_iter().enumerate() {
             let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
-            match &film {
-                Film::OnHost(data) => upload(&self.device, buffer, &data[index])?,
-                _ => self.recorder.fill(buffer, 0),
+            if film == Film::OnHost {
+                upload(&self.device, buffer, &self.bands[band].sums[index])?;
+            } else {
+                self.recorder.fill(buffer, 0);
             }
         }
         self.recorder.submit_and_wait()?;
@@ -238,12 +239,13 @@ impl Renderer {
 
     fn save_resident(&mut self) -> Result<()> {
         let Some(band) = self.resident.take() else { return Ok(()) };
-        let mut data: [Vec<u8>; 2] = Default::default();
-        for (data, slot) in data.iter_mut().zip(SUMS) {
-            let Some(buffer) = self.buffer(slot) else { continue };
-            *data = download(&self.device, buffer, bands::bytes_per_pixel(slot) * u64::from(self.bands[band].pixels))?;
+        let Band { pixels, film, sums, .. } = &mut self.bands[band];
+        for (data, slot) in sums.iter_mut().zip(SUMS) {
+            let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
+            data.resize((bands::bytes_per_pixel(slot) * u64::from(*pixels)) as usize, 0);
+            download_to(&self.device, buffer, data)?;
         }
-        self.bands[band].film = Film::OnHost(data);
+        *film = Film::OnHost;
         Ok(())
     }
 
