@@ -15,7 +15,8 @@ const uint MAX_HITS = 8u;
 // Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
 const uint MAX_RAYS = 4u;
 // Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
-// roundings of a position. Creases narrower than this are lit as if open.
+// roundings of a position. Creases narrower than this are lit as if
+// open. `reflect`, which also sees what lies far outside the unit ball, scales it with the triangle's extent there.
 const float SHADOW_OFFSET = 3.8146973e-6;
 // Least GGX width of an opaque material, which has no mirror.
 const float OPAQUE_ALPHA_MIN = 0.001;

@@ -152,7 +152,8 @@ constants! {
     /// Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
     MAX_RAYS: u32 = 4;
     /// Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
-    /// roundings of a position. Creases narrower than this are lit as if open.
+    /// roundings of a position. Creases narrower than this are lit as if
+    /// open. `reflect`, which also sees what lies far outside the unit ball, scales it with the triangle's extent there.
     SHADOW_OFFSET: f32 = 3.814_697_3e-6;
     /// Least GGX width of an opaque material, which has no mirror.
     OPAQUE_ALPHA_MIN: f32 = 1e-3;

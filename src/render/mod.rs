@@ -170,6 +170,15 @@ impl Renderer {
         }
     }
 
+    /// Forgets every sample and draws from `seed` from now on.
+    pub fn reseed(&mut self, seed: u32) -> Result<()> {
+        self.reset();
+        self.settings.seed = seed;
+        self.prepared.view.seed = seed;
+        let views = self.buffer(Slot::Views).expect("every renderer has a view");
+        upload(&self.device, views, bytemuck::bytes_of(&self.prepared.view))
+    }
+
     /// Adds the samples of `range`, which follows what is there. `progress` is called after each submission and may
     /// stop the render; then each pixel has at least one sample. Returns whether the range was finished.
     pub fn render_range(

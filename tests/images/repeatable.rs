@@ -48,6 +48,21 @@ fn two_runs_bands_portions_and_workgroups_give_the_same_bits() {
 }
 
 #[test]
+fn new_seed_is_a_new_render() {
+    let device = device();
+    let demo = demo();
+    let mut renderer =
+        Renderer::new(&device, &demo, &Settings { seed: 1, ..settings() }).expect("the renderer is made");
+    renderer.render(5).expect("renders");
+    renderer.reseed(settings().seed).expect("the seed is set");
+    renderer.render(9).expect("renders");
+    let reseeded = renderer.image().expect("the image is there");
+    drop(renderer);
+    drop(device);
+    assert_same(&image(&settings(), &[0..9]), &reseeded, "another seed before");
+}
+
+#[test]
 fn image_in_the_middle_changes_nothing() {
     let device = device();
     let mut renderer = Renderer::new(&device, &demo(), &settings()).expect("the renderer is made");

@@ -1,17 +1,24 @@
 //! The variance that an image states is the one it has.
 
-use crate::{channel, render};
-use translucent::{Scene, Settings};
+use crate::{channel, device};
+use translucent::{Renderer, Scene, Settings};
 
 const SEEDS: u32 = 64;
 
 #[test]
 fn stated_variance_is_the_spread_over_seeds() {
     let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo.gltf")).expect("the shipped scene loads");
-    let settings = |seed| Settings { resolution: Some((20, 20)), seed, ..Settings::default() };
+    let settings = Settings { resolution: Some((20, 20)), ..Settings::default() };
+    let device = device();
+    let mut renderer = Renderer::new(&device, &scene, &settings).expect("the renderer is made");
+    let mut image = |seed, samples| {
+        renderer.reseed(seed).expect("the seed is set");
+        renderer.render(samples).expect("renders");
+        renderer.image().expect("the image is there")
+    };
     // 19 samples: batches of unequal size.
     for samples in [8, 19, 64] {
-        let images: Vec<_> = (0..SEEDS).map(|seed| render(&scene, &settings(seed), samples)).collect();
+        let images: Vec<_> = (0..SEEDS).map(|seed| image(seed, samples)).collect();
         for name in ["R", "G", "B"] {
             let values: Vec<_> = images.iter().map(|i| channel(i, &format!("subsurface.{name}"))).collect();
             let stated: Vec<_> = images.iter().map(|i| channel(i, &format!("variance.{name}"))).collect();
