@@ -17,71 +17,28 @@
 //!   Lo ~ 1 / N * sum of Ft(wo) f E (2 pi r / s) e^(s r) J,   J = |no.d| / |n.d| / q^2.
 //!
 //! The exponentials of density and profile are one, so that neither overflows.
-//!
-//! # Sums
-//! Compensated: D. E. Knuth's TwoSum finds the rounding error of each addition exactly and a second number carries it
-//! (A. Neumaier, ZAMM 54 (1974)). A contribution with which a sum would exceed f32 is left out and counted as invalid.
 
 use super::boundary::transmittance;
 use super::light::{self, FAR};
 use super::math::cosine_direction;
+use super::pixel::position;
 use super::projection::{
     Seen, geometric_normal, interpolated_normal, inverse_scale, material, mixture_density, seen, shapes,
 };
 use super::random::{batch, key, scramble, sobol, unit};
 use super::sample::coordinate;
-use super::{Inputs, intersect, pixel};
+use super::sums::Contribution;
+use super::{Inputs, intersect};
 use crate::shared::{
-    BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, MISS, Material, PROJECTION_CAMERA, Probe,
-    SHADOW_OFFSET, Step, Sums, Surface,
+    BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, Material, PROJECTION_CAMERA, Probe,
+    SHADOW_OFFSET, Step, Surface,
 };
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
-
-/// What one dispatch adds to a pixel's sums.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contribution {
-    /// Zero if invalid.
-    pub radiance: DVec3,
-    /// Whether it was not finite and non-negative.
-    pub invalid: bool,
-}
-
-impl Contribution {
-    pub(super) fn of(radiance: DVec3) -> Contribution {
-        // As the kernel's sum sees it: what overflows f32 is not finite.
-        let valid = radiance.as_vec3().is_finite() && radiance.cmpge(DVec3::ZERO).all();
-        Contribution { radiance: if valid { radiance } else { DVec3::ZERO }, invalid: !valid }
-    }
-
-    /// Adds to the sums of a pixel as `accumulate.comp` does. `batch_sum` is the one of the sample's batch; where the
-    /// kernel keeps none, a caller's to forget.
-    pub fn add_subsurface(&self, step: &Step, surface: &Surface, sums: &mut Sums, batch_sum: &mut Vec3) {
-        let radiance = self.radiance.as_vec3();
-        let fits = !self.invalid && (sums.subsurface + radiance).is_finite() && (*batch_sum + radiance).is_finite();
-        if fits {
-            add(&mut sums.subsurface, &mut sums.subsurface_carry, radiance);
-            *batch_sum += radiance;
-        }
-        sums.invalid += u32::from(!fits);
-        if step.count != 0 {
-            sums.samples += 1;
-            sums.covered += u32::from(surface.triangle != MISS);
-        }
-    }
-}
-
-/// Compensated addition in f32: `sum + carry` grows by `x` up to a rounding of the carry.
-pub fn add(sum: &mut Vec3, carry: &mut Vec3, x: Vec3) {
-    let next = *sum + x;
-    let added = next - *sum;
-    *carry += (*sum - (next - added)) + (x - added);
-    *sum = next;
-}
 
 /// Environment coordinates of direction `j` of the step's sample.
 pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, dimension: u32) -> (f64, f64) {
-    let (px, py) = pixel(inputs.view, step, index);
+    let (px, py) = position(inputs.view, step, index);
     let number = (step.sample_index / BATCHES).wrapping_mul(inputs.view.directions).wrapping_add(j);
     let coordinate = |d: u32| {
         let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension + d);

@@ -9,6 +9,7 @@ pub mod boundary;
 pub mod intersect;
 pub mod light;
 pub mod math;
+pub mod pixel;
 pub mod primary;
 pub mod profile;
 pub mod projection;
@@ -17,6 +18,7 @@ pub mod reflect;
 pub mod reproject;
 pub mod resolve;
 pub mod sample;
+pub mod sums;
 
 use crate::shared::{
     BATCHES, ENVIRONMENT_NONE, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Triangle, View,
@@ -47,11 +49,6 @@ impl Inputs<'_> {
         let directions = if self.features.environment == ENVIRONMENT_NONE { 0 } else { self.view.directions };
         self.view.light_count + directions
     }
-}
-
-/// Column and row, in the full image, of pixel `index` of the step's band.
-pub fn pixel(view: &View, step: &Step, index: u32) -> (u32, u32) {
-    (view.crop_x + index % view.crop_width, step.first_row + index / view.crop_width)
 }
 
 /// The step of one sample that traces all its rays in one dispatch.
@@ -95,7 +92,7 @@ fn render_pixel(inputs: &Inputs, index: u32, rows: Range<u32>, samples: Range<u3
         let subsurface = accumulate::accumulate(inputs, &step, index, &surface, &probe, &hits);
         subsurface.add_subsurface(&step, &surface, &mut sums, &mut batch_sums[batch]);
         let reflection = reflect::reflect(inputs, &step, index, &surface);
-        reflect::add_reflection(&reflection, &mut sums);
+        reflection.add_reflection(&mut sums);
     }
     let step = step(inputs, samples.start, rows, samples);
     resolve::resolve(&inputs.features, &step, &sums, &batch_sums)

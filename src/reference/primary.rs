@@ -3,8 +3,9 @@
 //! A pixel's value is the mean over its area (box filter); the position in the pixel is a point of a (0, 2) sequence
 //! per stratum of samples.
 
+use super::pixel::position;
 use super::random::{batch, key, scramble, sobol, stratum, unit};
-use super::{Inputs, intersect, pixel};
+use super::{Inputs, intersect};
 use crate::shared::{DIM_PIXEL, MISS, Step, Surface, View};
 use glam::{DVec3, Vec2};
 
@@ -21,7 +22,7 @@ pub struct CameraRay {
 
 /// The ray of pixel `index` of the band, through its centre or through the point of the sample's stratum.
 pub fn camera_ray(view: &View, step: &Step, index: u32) -> CameraRay {
-    let (px, py) = pixel(view, step, index);
+    let (px, py) = position(view, step, index);
     let coordinate = |d: u32| {
         let point = sobol(stratum(step.sample_index), d as usize);
         unit(scramble(point, key(view.seed, px, py, batch(step.sample_index), DIM_PIXEL + d)))

@@ -7,16 +7,15 @@
 //! Environment directions come from several densities, chosen by an interval of u1 and combined by the balance
 //! heuristic: visible normals, the cosine (opaque matter), the image.
 
-use super::accumulate::{Contribution, add, direction_point, visibility};
+use super::accumulate::{direction_point, visibility};
 use super::boundary::{ggx, schlick, smith_g2, visible_normal, visible_normal_pdf};
 use super::light::{self, FAR};
 use super::math::{basis, cosine_direction, from_local};
 use super::primary::camera_ray;
 use super::projection::{Seen, material, seen};
+use super::sums::Contribution;
 use super::{Inputs, boundary};
-use crate::shared::{
-    DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Sums, Surface, TRANSLUCENT,
-};
+use crate::shared::{DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Surface, TRANSLUCENT};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -33,16 +32,6 @@ pub fn reflect(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> C
     let rays = step.ray_begin..step.ray_begin + step.ray_count;
     let reflected: DVec3 = rays.map(|k| ray(inputs, step, index, surface, &seen, &lobe, k)).sum();
     Contribution::of(emitted + reflected)
-}
-
-/// Adds to the sums of a pixel as `reflect.comp` does.
-pub fn add_reflection(contribution: &Contribution, sums: &mut Sums) {
-    let radiance = contribution.radiance.as_vec3();
-    let fits = !contribution.invalid && (sums.reflection + radiance).is_finite();
-    if fits {
-        add(&mut sums.reflection, &mut sums.reflection_carry, radiance);
-    }
-    sums.invalid += u32::from(!fits);
 }
 
 fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen, lobe: &Lobe, k: u32) -> DVec3 {

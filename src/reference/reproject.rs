@@ -9,8 +9,9 @@
 //! every sample decides anew. Which hit is the n-th depends on the order of traversal, so kernel and twin may keep
 //! different ones. The method as given keeps the first hit only.
 
+use super::pixel::position;
 use super::random::{batch, hash, key};
-use super::{Inputs, intersect, pixel};
+use super::{Inputs, intersect};
 use crate::shared::{BATCHES, DIM_OVERFLOW, Hits, MAX_HITS, PROJECTION_CAMERA, Probe, Step, Surface};
 
 /// The hits of the probe of pixel `index` of the band, whose first surface is `surface`.
@@ -30,7 +31,7 @@ pub fn reproject(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, pr
         kept.extend(all.min_by(|a, b| a.t.total_cmp(&b.t)));
         found.count = kept.len() as u32;
     } else {
-        let (px, py) = pixel(inputs.view, step, index);
+        let (px, py) = position(inputs.view, step, index);
         let key = key(inputs.view.seed, px, py, batch(step.sample_index), DIM_OVERFLOW)
             .wrapping_add(hash(step.sample_index / BATCHES));
         for hit in all {

@@ -5,9 +5,10 @@
 //! region for every technique, as the balance heuristic requires. `camera` draws it from
 //! sigma e^(-sigma r) / (2 pi r) with the one rate `camera_rate`, and follows the camera ray from the eye.
 
+use super::pixel::position;
 use super::projection::{CAMERA, dipole, fractions, material, seen};
 use super::random::{batch, key, scramble, unit};
-use super::{Inputs, pixel, profile};
+use super::{Inputs, profile};
 use crate::shared::{
     DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, PROJECTION_CAMERA, Probe, Step, Surface, TRANSLUCENT,
 };
@@ -22,7 +23,7 @@ pub const NONE: Probe =
 
 /// Coordinate `dimension` (one of the estimator's) of the step's sample at pixel `index`.
 pub fn coordinate(inputs: &Inputs, step: &Step, index: u32, dimension: u32) -> f64 {
-    let (px, py) = pixel(inputs.view, step, index);
+    let (px, py) = position(inputs.view, step, index);
     let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension);
     unit(scramble(step.point[dimension as usize], key))
 }

@@ -48,8 +48,9 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         renderer.strata[0] = None;
         let Renderer { recorder, kernels, bindings, .. } = renderer;
         recorder.begin()?;
-        recorder.dispatch(&kernels.resolve, bindings, pixels, &step);
-        recorder.dispatch(&kernels.primary, bindings, pixels, &step);
+        for kernel in [&kernels.resolve, &kernels.primary].into_iter().flatten() {
+            recorder.dispatch(kernel, bindings, pixels, &step);
+        }
         recorder.submit_and_wait()?;
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
@@ -149,26 +150,20 @@ impl Channels {
         let light = (pixel.subsurface + pixel.reflection).min(Vec3::MAX);
         let position = centre.position.as_vec3();
         let mut values = Vec::with_capacity(self.list.len());
-        values.extend(light.to_array().map(stored));
+        values.extend(light.to_array());
         values.push(pixel.alpha);
-        values.extend(pixel.subsurface.to_array().map(stored));
-        values.extend(pixel.reflection.to_array().map(stored));
+        values.extend(pixel.subsurface.to_array());
+        values.extend(pixel.reflection.to_array());
         values.extend(centre.normal.to_array());
         values.extend(position.to_array());
         values.extend([centre.depth as f32, pixel.samples as f32, centre.material as f32]);
         if self.has_variance {
-            values.extend(pixel.variance.to_array().map(stored));
+            values.extend(pixel.variance.to_array());
         }
         for (channel, value) in self.list.iter_mut().zip(values) {
             channel.data.push(value);
         }
     }
-}
-
-/// Sums and squares of finite light can be more than f32 holds; the largest number stands for them, so that no hour of
-/// rendering ends without a file.
-fn stored(value: f32) -> f32 {
-    if value.is_finite() { value } else { f32::MAX }
 }
 
 fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {

@@ -11,7 +11,7 @@ use crate::{
     reference::random,
     scene::{Frame, Scene},
     settings::Settings,
-    shared::{BATCHES, Features, MAX_RAYS, STRATUM, Slot, Step},
+    shared::{BATCHES, MAX_RAYS, STRATUM, Slot, Step},
 };
 use bands::{Band, Film};
 use std::ops::{ControlFlow, Range};
@@ -27,18 +27,21 @@ const SUMS: [Slot; 2] = [Slot::RunningSums, Slot::BatchSums];
 
 macro_rules! kernels {
     ($($stem:ident),*) => {
-        /// The compute pipelines that a scene needs, specialised to its features.
-        pub struct Kernels { $($stem: Kernel,)* }
+        /// The compute pipelines that a scene needs, specialised to its features; none of the others.
+        struct Kernels { $($stem: Option<Kernel>,)* }
 
         impl Kernels {
-            fn new(layout: &Layout, features: &Features, workgroup: u32) -> Result<Kernels> {
-                Ok(Kernels { $($stem: Kernel::new(
-                    layout,
-                    stringify!($stem),
-                    include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv")),
-                    features,
-                    workgroup,
-                )?,)* })
+            fn new(layout: &Layout, prepared: &Prepared, workgroup: u32) -> Result<Kernels> {
+                Ok(Kernels { $($stem: match needs(prepared, stringify!($stem)) {
+                    true => Some(Kernel::new(
+                        layout,
+                        stringify!($stem),
+                        include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv")),
+                        &prepared.features,
+                        workgroup,
+                    )?),
+                    false => None,
+                },)* })
             }
         }
 
@@ -48,6 +51,15 @@ macro_rules! kernels {
     };
 }
 kernels!(primary, sample, reproject, accumulate, reflect, resolve);
+
+/// Whether anything in the scene needs a kernel.
+fn needs(prepared: &Prepared, stem: &str) -> bool {
+    match stem {
+        "sample" | "reproject" | "accumulate" => prepared.has_translucent,
+        "reflect" => prepared.has_reflection,
+        _ => true,
+    }
+}
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +111,7 @@ impl Renderer {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
         }
         let layout = Layout::new(device)?;
-        let kernels = Kernels::new(&layout, &prepared.features, settings.workgroup)?;
+        let kernels = Kernels::new(&layout, &prepared, settings.workgroup)?;
         let mut buffers = Vec::new();
         for (slot, data) in scene_data(scene, &prepared) {
             let limit = device.max_storage_buffer_range();
@@ -276,26 +288,26 @@ impl Renderer {
             Step { first_row, pixel_count: pixels, sample_index, point, first: 1, count: 1, ..Step::default() };
         let Renderer { kernels, bindings, recorder, prepared, strata, .. } = self;
 
+        let mut dispatch = |kernel: &Option<Kernel>, step: &Step| {
+            kernel.iter().for_each(|kernel| recorder.dispatch(kernel, bindings, pixels, step));
+            kernel.is_some()
+        };
+
         let resident = &mut strata[(sample_index % BATCHES) as usize];
         if *resident != Some(random::stratum(sample_index)) {
-            recorder.dispatch(&kernels.primary, bindings, pixels, &step);
+            dispatch(&kernels.primary, &step);
             *resident = Some(random::stratum(sample_index));
         }
-        if prepared.has_translucent {
-            recorder.dispatch(&kernels.sample, bindings, pixels, &step);
-            recorder.dispatch(&kernels.reproject, bindings, pixels, &step);
-        }
+        dispatch(&kernels.sample, &step);
+        dispatch(&kernels.reproject, &step);
         // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty portion.
         for begin in (0..prepared.ray_count.max(1)).step_by(MAX_RAYS as usize) {
             step.ray_begin = begin;
             step.ray_count = (prepared.ray_count - begin.min(prepared.ray_count)).min(MAX_RAYS);
-            if prepared.has_translucent {
-                recorder.dispatch(&kernels.accumulate, bindings, pixels, &step);
-                step.count = 0;
-            }
-            if prepared.has_reflection {
-                recorder.dispatch(&kernels.reflect, bindings, pixels, &step);
-                step.count = 0;
+            for kernel in [&kernels.accumulate, &kernels.reflect] {
+                if dispatch(kernel, &step) {
+                    step.count = 0;
+                }
             }
             step.first = 0;
         }

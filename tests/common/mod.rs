@@ -5,9 +5,10 @@ pub mod sphere;
 use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 use translucent::Normalisation;
-use translucent::reference::accumulate::{Contribution, accumulate};
+use translucent::reference::accumulate::accumulate;
 use translucent::reference::reproject::reproject;
 use translucent::reference::sample::sample;
+use translucent::reference::sums::Contribution;
 use translucent::reference::{Inputs, profile, step};
 use translucent::shared::*;
 

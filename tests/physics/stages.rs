@@ -3,7 +3,7 @@
 use crate::common::*;
 use glam::{DVec3, Vec3, dvec3, vec3};
 use translucent::Normalisation::Energy;
-use translucent::reference::accumulate::{accumulate, add};
+use translucent::reference::accumulate::accumulate;
 use translucent::reference::primary::{camera_ray, primary};
 use translucent::reference::profile::material;
 use translucent::reference::random::{hash, key, unit};
@@ -11,6 +11,7 @@ use translucent::reference::reflect::reflect;
 use translucent::reference::reproject::reproject;
 use translucent::reference::resolve::{batch_count, resolve};
 use translucent::reference::sample::sample;
+use translucent::reference::sums::add;
 use translucent::reference::{render, step};
 use translucent::shared::*;
 
