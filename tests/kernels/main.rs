@@ -5,6 +5,7 @@
 #[allow(dead_code)]
 #[path = "../common/mod.rs"]
 mod common;
+mod math;
 mod overflow;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
@@ -73,6 +74,12 @@ impl Bench {
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
         let bindings = Bindings::new(&self.layout, &bound).expect("bindings");
         Loaded { features: inputs.features, bindings, buffers }
+    }
+
+    /// Adds a kernel that only tests have.
+    pub fn add(&mut self, stem: &'static str, spirv: &[u8], features: &Features) {
+        let kernel = Kernel::new(&self.layout, stem, spirv, features, 64).expect("kernel");
+        self.kernels.insert((stem, *features), kernel);
     }
 
     /// Runs one kernel once.
