@@ -88,9 +88,9 @@ struct View {
     float perspective;
     // Orthographic only: distance from the camera's plane to the pivot's.
     float reach;
-    // Width of the full image [pixels].
+    // Width of the full image (pixels).
     uint width;
-    // Height of the full image [pixels].
+    // Height of the full image (pixels).
     uint height;
     // First column that is rendered.
     uint crop_x;

@@ -55,7 +55,7 @@
 //! | [`error`] | nothing | [`Error`]: file, item and problem, or the step |
 //! | [`settings`] | `shared` | [`Settings`]: what a caller may choose |
 //! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
-//! | [`reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
+//! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |

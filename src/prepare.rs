@@ -77,7 +77,7 @@ const MEAN_FREE_PATH: (f64, f64) = (1.0 / (1 << 17) as f64, 1e9);
 /// GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
 const ALPHA_MIN: f64 = 1e-6;
 
-/// Longest side of an image [pixels].
+/// Longest side of an image (pixels).
 pub const MAX_SIDE: u32 = 65_536;
 
 /// Checks the settings against the scene and fills the shared structs.

@@ -40,10 +40,10 @@ pub enum CameraChoice {
 /// Everything about a render that is not the scene. `Settings::default()` is the program's default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Width and height [pixels]; without it 1024x1024, or the camera's aspect ratio at that height.
+    /// Width and height (pixels); without it 1024x1024, or the camera's aspect ratio at that height.
     pub resolution: Option<(u32, u32)>,
     pub camera: CameraChoice,
-    /// Rendered part of the image, `[x0, y0, x1, y1]`, exclusive of x1 and y1 [pixels].
+    /// Rendered part of the image, `[x0, y0, x1, y1]`, exclusive of x1 and y1 (pixels).
     pub crop: Option<[u32; 4]>,
     /// Incoming environment directions at each position, N >= 1.
     pub directions: u32,

@@ -223,9 +223,9 @@ structs! {
         perspective: f32,
         /// Orthographic only: distance from the camera's plane to the pivot's.
         reach: f32,
-        /// Width of the full image [pixels].
+        /// Width of the full image (pixels).
         width: u32,
-        /// Height of the full image [pixels].
+        /// Height of the full image (pixels).
         height: u32,
         /// First column that is rendered.
         crop_x: u32,

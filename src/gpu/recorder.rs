@@ -224,7 +224,7 @@ impl Recorder {
         self.read_profile()
     }
 
-    /// Name and time [s] of each dispatch of the last recording, in order: the first 2,048, and none without
+    /// Name and time (s) of each dispatch of the last recording, in order: the first 2,048, and none without
     /// [`Recorder::profiled`] or on a device without timestamps.
     pub fn scopes(&self) -> Vec<(&'static str, f64)> {
         self.profile.iter().flat_map(|p| p.names.iter().copied().zip(p.seconds.iter().copied())).collect()

@@ -13,13 +13,13 @@ use std::{collections::BTreeMap, path::Path};
 /// The rendered part of an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
-    /// Columns of the rendered part [pixels].
+    /// Columns of the rendered part (pixels).
     pub width: u32,
-    /// Rows of the rendered part [pixels].
+    /// Rows of the rendered part (pixels).
     pub height: u32,
     /// Where its upper left pixel is in the full image: column, row.
     pub origin: (u32, u32),
-    /// Width and height of the full image [pixels].
+    /// Width and height of the full image (pixels).
     pub full: (u32, u32),
     /// Row by row from the top, `width * height` values each.
     pub channels: Vec<Channel>,

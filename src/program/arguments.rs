@@ -49,7 +49,7 @@ pub fn material(text: &str) -> Result<(String, String), String> {
     parts.map(|(name, preset)| (name.into(), preset.into())).ok_or("it is NAME=PRESET, such as skin=skin1".into())
 }
 
-/// A length such as `cm` or `29.2mm` [m].
+/// A length such as `cm` or `29.2mm` (m).
 pub fn unit(text: &str) -> Result<f64, String> {
     parse_unit(text).map_err(|error| error.to_string())
 }

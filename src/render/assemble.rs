@@ -96,9 +96,9 @@ struct Geometry {
 /// What the middle of a pixel shows.
 struct Centre {
     normal: Vec3,
-    /// World position [m].
+    /// World position (m).
     position: DVec3,
-    /// Distance along the view axis [m].
+    /// Distance along the view axis (m).
     depth: f64,
     /// Index of the material, -1 for none.
     material: i32,

@@ -24,7 +24,10 @@ impl Scene {
                 return Ok(self.cameras.first().cloned().unwrap_or_else(|| self.framing_camera(aspect)));
             }
             CameraChoice::Index(index) => self.cameras.get(*index),
-            CameraChoice::Name(name) => self.cameras.iter().find(|camera| camera.name == *name),
+            CameraChoice::Name(name) => {
+                let object = |camera: &&Camera| camera.object_name.as_ref() == Some(name);
+                self.cameras.iter().find(|camera| camera.name == *name).or_else(|| self.cameras.iter().find(object))
+            }
         };
         found.cloned().ok_or_else(|| {
             let asked = match choice {
@@ -50,6 +53,7 @@ impl Scene {
         let distance = FRAMING_MARGIN / self.frame.scale / narrow.sin();
         Camera {
             name: "framing".into(),
+            object_name: None,
             eye: self.frame.centre - forward * distance,
             right,
             up: right.cross(forward),

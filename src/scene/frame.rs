@@ -7,7 +7,7 @@ use crate::{Error, Result, shared};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 
-/// Radii of the frame's geometry [m] whose squares f64 and f32 can hold.
+/// Radii of the frame's geometry (m) whose squares f64 and f32 can hold.
 const RADIUS_RANGE: (f64, f64) = (1e-12, 1e12);
 /// Largest internal coordinate: beyond it, f32 boxes and areas lose their meaning.
 const COORDINATE_MAX: f64 = 1e9;

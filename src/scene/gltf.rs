@@ -57,7 +57,7 @@ const COMPRESSIONS: &[&str] = &["KHR_draco_mesh_compression", "EXT_meshopt_compr
 /// Largest coordinate that a transform may give [units of the file].
 const COORDINATE_MAX: f64 = 1e30;
 
-/// Largest vertical angle of a camera [radians]: at pi, its picture would be infinitely wide.
+/// Largest vertical angle of a camera (radians): at pi, its picture would be infinitely wide.
 const YFOV_MAX: f64 = 3.13;
 
 /// Reads a whole file that lies (or would lie) at `file`.
@@ -256,7 +256,7 @@ fn read_camera(
     transform: &DAffine3,
     unit: f64,
 ) -> Result<Camera> {
-    let name = node_name.map_or_else(|| item.name(), |name| Ok(Some(name)))?;
+    let object_name = item.name()?;
     let kind = item.need("type")?;
     let lens = match kind.string()? {
         "perspective" => {
@@ -283,7 +283,8 @@ fn read_camera(
     let up = (up - forward * up.dot(forward)).try_normalize();
     let up = up.ok_or_else(|| node.error("its transform leaves the camera no upward direction"))?;
     Ok(Camera {
-        name: name.unwrap_or_else(|| format!("camera {index}")),
+        name: node_name.or_else(|| object_name.clone()).unwrap_or_else(|| format!("camera {index}")),
+        object_name,
         eye: transform.translation * unit,
         right: forward.cross(up),
         up,

@@ -16,7 +16,7 @@ const DEFAULT_IOR: f64 = 1.5;
 const IOR_RANGE: (f64, f64) = (0.1, 10.0);
 /// Stands for an attenuation colour of 0, which would be an infinite extinction.
 const DARKEST_ATTENUATION: f64 = 1e-4;
-/// Longest mean free path [m] and largest coefficient [1/m]: beyond, f32 kernels cannot hold the numbers.
+/// Longest mean free path (m) and largest coefficient [1/m]: beyond, f32 kernels cannot hold the numbers.
 const COEFFICIENT_MAX: f64 = 1e12;
 const LENGTH_RANGE: (f64, f64) = (1e-12, 1e12);
 

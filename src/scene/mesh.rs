@@ -13,7 +13,7 @@ const TRIANGLES_MAX: usize = 100_000_000;
 /// A triangle is dropped as one of zero area if twice its area is below this share of its longest edge squared:
 /// edges rounded to f32 would then say little about its normal.
 const FLATNESS_MIN: f64 = 1e-6;
-/// Largest coordinate [m].
+/// Largest coordinate (m).
 const COORDINATE_MAX: f64 = 1e30;
 
 /// A triangle in metres.

@@ -212,7 +212,7 @@ pub struct Light {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
     Point,
-    /// Angles from the axis [radians], 0 <= inner < outer <= pi/2.
+    /// Angles from the axis (radians), 0 <= inner < outer <= pi/2.
     Spot {
         inner: f64,
         outer: f64,
@@ -225,6 +225,8 @@ pub enum LightKind {
 pub struct Camera {
     /// The node's name, or the camera's.
     pub name: String,
+    /// The name of the file's camera object, which several nodes may show; it chooses too.
+    pub object_name: Option<String>,
     pub eye: DVec3,
     /// Orthonormal: right, up, forward.
     pub right: DVec3,
@@ -236,13 +238,13 @@ pub struct Camera {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
     Perspective {
-        /// Full vertical angle [radians].
+        /// Full vertical angle (radians).
         yfov: f64,
         /// Width over height, if the file fixes it.
         aspect: Option<f64>,
     },
     Orthographic {
-        /// Half width and half height [m].
+        /// Half width and half height (m).
         xmag: f64,
         ymag: f64,
     },
@@ -252,7 +254,7 @@ pub enum Lens {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     pub map: EnvironmentMap,
-    /// Rotation about +Y [degrees], counter-clockwise seen from above.
+    /// Rotation about +Y (degrees), counter-clockwise seen from above.
     pub rotation: f64,
     /// Factor on the radiance.
     pub scale: f64,

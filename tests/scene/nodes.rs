@@ -80,6 +80,11 @@ fn cameras_are_chosen_by_name_or_number() {
     assert_eq!(name(CameraChoice::Default).ok().as_deref(), Some("front"));
     assert_eq!(name(CameraChoice::Index(1)).ok().as_deref(), Some("plan"));
     assert_eq!(name(CameraChoice::Name("plan".into())).ok().as_deref(), Some("plan"));
+    assert_eq!(
+        name(CameraChoice::Name("lens".into())).ok().as_deref(),
+        Some("front"),
+        "the camera object is named too"
+    );
     for (choice, asked) in [(CameraChoice::Index(2), "2"), (CameraChoice::Name("back".into()), "`back`")] {
         let message = name(choice).expect_err("no such camera").to_string();
         let wanted = format!("camera: test.gltf has no camera {asked}; it has: 0 `front`, 1 `plan`");

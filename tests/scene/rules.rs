@@ -205,7 +205,7 @@ fn cameras_and_lights() {
     let camera = |camera: Value| patched(json!({"nodes": [{"mesh": 0, "camera": 0}], "cameras": [camera]}));
     let perspective = |members: Value| camera(json!({"type": "perspective", "perspective": members}));
     assert_refused(&perspective(json!({"yfov": 0})), "cameras[0].perspective.yfov", "must be above 0");
-    assert_refused(&perspective(json!({"yfov": 3.14})), "cameras[0].perspective.yfov", "must be at most 3.13");
+    assert_refused(&perspective(json!({"yfov": 3.135})), "cameras[0].perspective.yfov", "must be at most 3.13");
     assert_refused(&perspective(json!({})), "cameras[0].perspective", "has no `yfov`");
     let aspect = perspective(json!({"yfov": 1, "aspectRatio": -1}));
     assert_refused(&aspect, "cameras[0].perspective.aspectRatio", "must be above 0");
