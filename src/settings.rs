@@ -56,7 +56,8 @@ pub struct Settings {
     /// Keeps the sums of each batch, from which the variance comes; of no use below `shared::BATCHES` samples.
     pub variance: bool,
     /// Share of the profile's energy beyond the ball in which probes look for surfaces; 0 has no ball.
-    /// It is the only bias of `mis` and `normal`: at most this share of the light is missed.
+    /// `mis` and `normal` miss at most this share of the light. Their other biases are the lift of shadow rays
+    /// ([`shared::SHADOW_OFFSET`]) and, for matter that f32 cannot resolve, a mean free path kept within its reach.
     pub radius_tail: f64,
     /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows. Without it 2^18, or
     /// what the device's bindings and memory allow. The image does not depend on it.
