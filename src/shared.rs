@@ -91,6 +91,11 @@ macro_rules! buffers {
             pub fn stride(self) -> usize {
                 match self { $(Slot::$slot => size_of::<$element>(),)* }
             }
+
+            /// What it holds.
+            pub fn about(self) -> &'static str {
+                match self { $(Slot::$slot => concat!($($doc),*).trim_start(),)* }
+            }
         }
 
         fn glsl_buffers(text: &mut String) {
@@ -104,6 +109,15 @@ macro_rules! buffers {
     };
 }
 
+/// A specialization constant as [`Features::named`] shows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NamedFeature {
+    pub name: &'static str,
+    pub id: u32,
+    pub value: u32,
+    pub about: &'static str,
+}
+
 macro_rules! features {
     ($($(#[doc = $doc:literal])* $field:ident = $id:literal: $constant:ident,)*) => {
         /// What a scene and its settings require of the kernels: the specialization constants.
@@ -114,6 +128,16 @@ macro_rules! features {
             /// (constant id, value) of every specialization constant.
             pub fn constants(&self) -> Vec<(u32, u32)> {
                 vec![$(($id, self.$field),)*]
+            }
+
+            /// Every specialization constant for a reader: its name in GLSL, id and value, and what it is.
+            pub fn named(&self) -> Vec<NamedFeature> {
+                vec![$(NamedFeature {
+                    name: stringify!($constant),
+                    id: $id,
+                    value: self.$field,
+                    about: concat!($($doc),*).trim_start(),
+                },)*]
             }
         }
 
@@ -129,6 +153,9 @@ macro_rules! features {
 macro_rules! constants {
     ($($(#[doc = $doc:literal])* $name:ident: $type:tt = $value:expr;)*) => {
         $($(#[doc = $doc])* pub const $name: $type = $value;)*
+
+        /// Name and value of every constant.
+        pub const CONSTANTS: &[(&str, f64)] = &[$((stringify!($name), $name as f64),)*];
 
         fn glsl_constants(text: &mut String) {
             $($(text.push_str(concat!("//", $doc, "\n"));)*

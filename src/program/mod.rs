@@ -3,6 +3,7 @@
 pub mod arguments;
 pub mod merge;
 pub mod render;
+pub mod scene;
 pub mod tables;
 
 use std::{

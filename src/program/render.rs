@@ -1,8 +1,7 @@
 //! `render`: a glTF scene becomes an EXR image, and a PNG where one is asked for.
 
-use super::{Failure, INTERRUPTED, arguments, arguments::EnvironmentSource, keep, print};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use glam::DVec3;
+use super::{Failure, INTERRUPTED, arguments, print, scene::SceneOptions};
+use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::{
     fmt,
@@ -16,9 +15,8 @@ use std::{
     time::Instant,
 };
 use translucent::{
-    CameraChoice, Device, DeviceOptions, Image, LoadOptions, Normalisation, Projection, Renderer, Scene, Settings,
+    Device, DeviceOptions, Image, Renderer, Settings,
     image::{Attribute, check_writable},
-    scene::{Environment, EnvironmentMap},
     shared::BATCHES,
 };
 
@@ -27,59 +25,17 @@ const LAYERS: [&str; 8] = ["subsurface", "reflection", "variance", "N", "P", "Z"
 
 #[derive(clap::Args)]
 pub struct Render {
-    /// The scene, a glTF 2.0 file.
-    #[arg(value_name = "SCENE.gltf|.glb")]
-    scene: PathBuf,
+    #[command(flatten)]
+    scene: SceneOptions,
     /// The EXR file to write; without it the scene's name with .exr, in the current folder.
     #[arg(short, long, value_name = "OUT.exr")]
     output: Option<PathBuf>,
-    /// Size of the full image in pixels; without it 1024 high, as wide as the camera's aspect ratio asks.
-    #[arg(long, value_name = "WxH", value_parser = arguments::resolution)]
-    resolution: Option<(u32, u32)>,
-    /// Camera by name or index; without it the first, or one that frames the scene.
-    #[arg(long, value_name = "NAME|INDEX", value_parser = arguments::camera)]
-    camera: Option<CameraChoice>,
     /// Samples of each pixel; A:B renders samples A to B-1, a part that `merge` puts together with others.
     #[arg(long, value_name = "M|A:B", default_value = "64", value_parser = arguments::samples)]
     samples: Range<u32>,
-    /// Incoming directions of the environment at each sampled position.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    directions: u32,
-    /// How a sampled point is carried to the surface: all techniques combined, the camera ray alone (biased), the
-    /// normal axis alone.
-    #[arg(long, default_value = "mis", value_parser = projections())]
-    projection: Projection,
-    /// Whether all light that enters and is not absorbed leaves again, or the darker constant of Jensen et al. 2001.
-    #[arg(long, default_value = "energy", value_parser = normalisations())]
-    normalisation: Normalisation,
-    /// Profile of every material; auto is what the material says, which is the standard dipole.
-    #[arg(long, default_value = "auto", value_parser = ["auto", "standard"])]
-    model: String,
     /// How surfaces are found: rays traced through the scene.
     #[arg(long, default_value = "trace", value_parser = ["trace"])]
     reproject: String,
-    /// Light from infinitely far away: a latitude-longitude image or one radiance.
-    #[arg(long, value_name = "FILE.hdr|.exr|constant:R,G,B", value_parser = arguments::environment)]
-    environment: Option<EnvironmentSource>,
-    /// Turns the environment about the up axis, counter-clockwise seen from above, in degrees.
-    #[arg(long, value_name = "DEG", requires = "environment", allow_negative_numbers = true,
-          value_parser = arguments::finite)]
-    environment_rotation: Option<f64>,
-    /// Factor on the environment's radiance.
-    #[arg(long, value_name = "S", requires = "environment", allow_negative_numbers = true, value_parser = arguments::not_negative)]
-    environment_scale: Option<f64>,
-    /// Show the environment where no surface is.
-    #[arg(long)]
-    show_environment: bool,
-    /// Gives a material of the file the properties of a preset (see `presets`); may be repeated.
-    #[arg(long, value_name = "NAME=PRESET", value_parser = arguments::material)]
-    material: Vec<(String, String)>,
-    /// What one unit of the file's geometry is: m, cm, mm, 29.2mm.
-    #[arg(long, value_name = "LENGTH", default_value = "m", value_parser = arguments::unit)]
-    unit: f64,
-    /// Render these pixels only; X1 and Y1 are exclusive.
-    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = arguments::crop)]
-    crop: Option<[u32; 4]>,
     /// Layers to write beside R, G, B and A: all, or some of subsurface, reflection, variance, N, P, Z, samples,
     /// material, separated by commas.
     #[arg(long, value_name = "LIST|all", default_value = "all", value_delimiter = ',',
@@ -102,26 +58,12 @@ pub struct Render {
     quiet: bool,
 }
 
-fn projections() -> impl TypedValueParser<Value = Projection> {
-    PossibleValuesParser::new(["mis", "camera", "normal"]).map(|name| match name.as_str() {
-        "camera" => Projection::Camera,
-        "normal" => Projection::Normal,
-        _ => Projection::Mis,
-    })
-}
-
-fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
-    PossibleValuesParser::new(["energy", "jensen2001"]).map(|name| match name.as_str() {
-        "jensen2001" => Normalisation::Jensen2001,
-        _ => Normalisation::Energy,
-    })
-}
-
 impl Render {
     pub fn run(self) -> Result<ExitCode, Failure> {
         let output = self.output()?;
         let stop = stop_on_interrupt()?;
-        let scene = self.load().map_err(Failure::while_reading)?;
+        let (scene, warnings) = self.scene.load().map_err(Failure::while_reading)?;
+        warnings.iter().for_each(|warning| self.warn(warning));
         let options = DeviceOptions { device: self.device.clone(), ..DeviceOptions::default() };
         let device = Device::open(&options)?;
         let mut renderer = Renderer::new(&device, &scene, &self.settings())?;
@@ -162,8 +104,9 @@ impl Render {
         let output = match &self.output {
             Some(output) => output.clone(),
             None => {
-                let name = self.scene.file_stem();
-                let name = name.ok_or_else(|| Failure::input(format!("{}: not a file", self.scene.display())))?;
+                let file = &self.scene.file;
+                let name = file.file_stem();
+                let name = name.ok_or_else(|| Failure::input(format!("{}: not a file", file.display())))?;
                 PathBuf::from(format!("{}.exr", name.to_string_lossy()))
             }
         };
@@ -172,43 +115,9 @@ impl Render {
                 return Err(Failure::input(format!("{}: its name must end in .{extension}", path.display())));
             }
             check_writable(path)?;
-            keep(&self.scene, path)?;
-            if let Some(EnvironmentSource::File(environment)) = &self.environment {
-                keep(environment, path)?;
-            }
+            self.scene.keep_from(path)?;
         }
         Ok(output)
-    }
-
-    fn load(&self) -> translucent::Result<Scene> {
-        let options = LoadOptions { unit: self.unit, materials: self.material.clone() };
-        let mut scene = Scene::load_with(&self.scene, &options)?;
-        let mut environment = match &self.environment {
-            Some(EnvironmentSource::Constant(radiance)) => Some(Environment::constant(DVec3::from_array(*radiance))?),
-            Some(EnvironmentSource::File(file)) => Some(Environment::load(file)?),
-            None => None,
-        };
-        if !scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some()) {
-            let names: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
-            let names = names.join(", ");
-            self.warn(&format!(
-                "no surface is translucent: give a material a preset with --material; there are: {names}"
-            ));
-        }
-        if environment.is_none() && scene.lights.is_empty() && scene.environment.map == EnvironmentMap::None {
-            self.warn("no light in the scene and no --environment: a constant environment of radiance 1 is used");
-            environment = Some(Environment::constant(DVec3::ONE)?);
-        }
-        if let Some(mut environment) = environment {
-            environment.rotation = self.environment_rotation.unwrap_or(0.0);
-            environment.scale = self.environment_scale.unwrap_or(1.0);
-            scene.set_environment(environment)?;
-        }
-        // Only now: some are about the environment.
-        for warning in &scene.warnings {
-            self.warn(warning);
-        }
-        Ok(scene)
     }
 
     fn warn(&self, text: &str) {
@@ -219,16 +128,9 @@ impl Render {
 
     fn settings(&self) -> Settings {
         Settings {
-            resolution: self.resolution,
-            camera: self.camera.clone().unwrap_or_default(),
-            crop: self.crop,
-            directions: self.directions,
-            projection: self.projection,
-            normalisation: self.normalisation,
             seed: self.seed,
-            show_environment: self.show_environment,
             variance: self.wants("variance") && self.samples.len() >= BATCHES as usize,
-            ..Settings::default()
+            ..self.scene.settings()
         }
     }
 

@@ -1,0 +1,131 @@
+//! What is rendered and how it is seen: the options that `render` and `inspect` share.
+
+use super::{Failure, arguments, arguments::EnvironmentSource, keep};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use translucent::{
+    CameraChoice, LoadOptions, Normalisation, Projection, Scene, Settings,
+    scene::{Environment, EnvironmentMap},
+};
+
+#[derive(clap::Args)]
+pub struct SceneOptions {
+    /// The scene, a glTF 2.0 file.
+    #[arg(value_name = "SCENE.gltf|.glb")]
+    pub file: PathBuf,
+    /// Size of the full image in pixels; without it 1024 high, as wide as the camera's aspect ratio asks.
+    #[arg(long, value_name = "WxH", value_parser = arguments::resolution)]
+    resolution: Option<(u32, u32)>,
+    /// Camera by name or index; without it the first, or one that frames the scene.
+    #[arg(long, value_name = "NAME|INDEX", value_parser = arguments::camera)]
+    camera: Option<CameraChoice>,
+    /// Incoming directions of the environment at each sampled position.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    directions: u32,
+    /// How a sampled point is carried to the surface: all techniques combined, the camera ray alone (biased), the
+    /// normal axis alone.
+    #[arg(long, default_value = "mis", value_parser = projections())]
+    projection: Projection,
+    /// Whether all light that enters and is not absorbed leaves again, or the darker constant of Jensen et al. 2001.
+    #[arg(long, default_value = "energy", value_parser = normalisations())]
+    normalisation: Normalisation,
+    /// Profile of every material; auto is what the material says, which is the standard dipole.
+    #[arg(long, default_value = "auto", value_parser = ["auto", "standard"])]
+    model: String,
+    /// Light from infinitely far away: a latitude-longitude image or one radiance.
+    #[arg(long, value_name = "FILE.hdr|.exr|constant:R,G,B", value_parser = arguments::environment)]
+    environment: Option<EnvironmentSource>,
+    /// Turns the environment about the up axis, counter-clockwise seen from above, in degrees.
+    #[arg(long, value_name = "DEG", requires = "environment", allow_negative_numbers = true,
+          value_parser = arguments::finite)]
+    environment_rotation: Option<f64>,
+    /// Factor on the environment's radiance.
+    #[arg(long, value_name = "S", requires = "environment", allow_negative_numbers = true, value_parser = arguments::not_negative)]
+    environment_scale: Option<f64>,
+    /// Show the environment where no surface is.
+    #[arg(long)]
+    show_environment: bool,
+    /// Gives a material of the file the properties of a preset (see `presets`); may be repeated.
+    #[arg(long, value_name = "NAME=PRESET", value_parser = arguments::material)]
+    material: Vec<(String, String)>,
+    /// What one unit of the file's geometry is: m, cm, mm, 29.2mm.
+    #[arg(long, value_name = "LENGTH", default_value = "m", value_parser = arguments::unit)]
+    unit: f64,
+    /// Render these pixels only; X1 and Y1 are exclusive.
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = arguments::crop)]
+    crop: Option<[u32; 4]>,
+}
+
+fn projections() -> impl TypedValueParser<Value = Projection> {
+    PossibleValuesParser::new(["mis", "camera", "normal"]).map(|name| match name.as_str() {
+        "camera" => Projection::Camera,
+        "normal" => Projection::Normal,
+        _ => Projection::Mis,
+    })
+}
+
+fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
+    PossibleValuesParser::new(["energy", "jensen2001"]).map(|name| match name.as_str() {
+        "jensen2001" => Normalisation::Jensen2001,
+        _ => Normalisation::Energy,
+    })
+}
+
+impl SceneOptions {
+    /// The scene with its environment, and what a user should know about it.
+    pub fn load(&self) -> translucent::Result<(Scene, Vec<String>)> {
+        let options = LoadOptions { unit: self.unit, materials: self.material.clone() };
+        let mut scene = Scene::load_with(&self.file, &options)?;
+        let mut environment = match &self.environment {
+            Some(EnvironmentSource::Constant(radiance)) => Some(Environment::constant(DVec3::from_array(*radiance))?),
+            Some(EnvironmentSource::File(file)) => Some(Environment::load(file)?),
+            None => None,
+        };
+        let mut warnings = Vec::new();
+        if !scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some()) {
+            let names: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+            let names = names.join(", ");
+            warnings.push(format!(
+                "no surface is translucent: give a material a preset with --material; there are: {names}"
+            ));
+        }
+        if environment.is_none() && scene.lights.is_empty() && scene.environment.map == EnvironmentMap::None {
+            warnings.push(
+                "no light in the scene and no --environment: a constant environment of radiance 1 is used".into(),
+            );
+            environment = Some(Environment::constant(DVec3::ONE)?);
+        }
+        if let Some(mut environment) = environment {
+            environment.rotation = self.environment_rotation.unwrap_or(0.0);
+            environment.scale = self.environment_scale.unwrap_or(1.0);
+            scene.set_environment(environment)?;
+        }
+        // Only now: some are about the environment.
+        warnings.extend(scene.warnings.iter().cloned());
+        Ok((scene, warnings))
+    }
+
+    /// The settings that follow from these options; the rest are the defaults.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            resolution: self.resolution,
+            camera: self.camera.clone().unwrap_or_default(),
+            crop: self.crop,
+            directions: self.directions,
+            projection: self.projection,
+            normalisation: self.normalisation,
+            show_environment: self.show_environment,
+            ..Settings::default()
+        }
+    }
+
+    /// Refuses to write over a file that is read.
+    pub fn keep_from(&self, output: &Path) -> Result<(), Failure> {
+        keep(&self.file, output)?;
+        match &self.environment {
+            Some(EnvironmentSource::File(environment)) => keep(environment, output),
+            _ => Ok(()),
+        }
+    }
+}
