@@ -1,7 +1,8 @@
 //! The kernels in f64, written from the formulas: twins of `glsl/*.comp` and `glsl/*.glsl` under the same stems.
 //!
 //! A twin takes what one invocation of its kernel reads and returns what it writes, in the shared structs; inside it
-//! computes in f64. [`render`] runs them in order. [`area`] is an integrator of its own that shares nothing with them.
+//! computes in f64. [`render`] runs them in order. [`area`] is an integrator of its own that shares nothing with them;
+//! [`mod@walk`] is what the models approximate.
 
 pub mod accumulate;
 pub mod area;
@@ -19,6 +20,7 @@ pub mod reproject;
 pub mod resolve;
 pub mod sample;
 pub mod sums;
+pub mod walk;
 
 use crate::shared::{
     BATCHES, ENVIRONMENT_NONE, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Triangle, View,

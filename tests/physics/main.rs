@@ -11,3 +11,4 @@ mod profile;
 mod random;
 mod sphere;
 mod stages;
+mod walk;

@@ -1,0 +1,129 @@
+//! A body in the light: what leaves each part of its surface.
+
+use super::shape::Body;
+use super::{End, Estimate, Exit, Matter, Random, Tally, entered, walk};
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+
+/// Light from infinitely far away.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// Unit vector in which it shines; irradiance 1 across it.
+    Directional(DVec3),
+    /// Radiance 1 from everywhere.
+    Uniform,
+}
+
+/// Flux [irradiance x area], by sigma_a.
+#[derive(Clone, Debug)]
+pub struct Exitance {
+    /// Flux of scattered light that leaves each bin; over the bin's area it is the mean exitance.
+    pub bins: Vec<Estimate>,
+    /// All that was scattered and left.
+    pub scattered: Estimate,
+    /// What passed through without being scattered.
+    pub straight: Estimate,
+    /// What entered.
+    pub entered: Estimate,
+    /// Share of the paths that rounding or a hole in the mesh lost.
+    pub lost: f64,
+}
+
+/// Follows `paths` paths from the light and weighs them for each of `absorptions` (sigma_a [1/length]; that of `matter`
+/// is ignored). `bin` says to which of `bins` parts of the surface an exit belongs.
+///
+/// Paths start uniformly in a disk across the light that covers the body, so shadows that it casts on itself are in.
+pub fn exitance(
+    body: &impl Body,
+    matter: Matter,
+    absorptions: &[f64],
+    light: Light,
+    bins: usize,
+    bin: impl Fn(&Exit) -> usize + Sync,
+    paths: u64,
+    seed: u64,
+) -> Vec<Exitance> {
+    let least = absorptions.iter().copied().fold(f64::INFINITY, f64::min);
+    let matter = Matter { sigma_a: least, ..matter };
+    let stride = bins + 2;
+    let all = stride * absorptions.len();
+    let tally = Tally::run(all + 1, paths, seed, |random, tally| {
+        let Some((position, direction)) = enter(body, matter.ior, light, random) else { return };
+        tally.add(all, 1.0);
+        let exit = match walk(body, &matter, position, direction, random) {
+            End::Left(exit) => exit,
+            End::Absorbed => return,
+            End::Lost => {
+                tally.lost += 1;
+                return;
+            }
+        };
+        for (row, &sigma_a) in absorptions.iter().enumerate() {
+            let weight = exit.weight(sigma_a);
+            if exit.scatterings == 0 {
+                tally.add(row * stride + bins + 1, weight);
+            } else {
+                tally.add(row * stride + bins, weight);
+                tally.add(row * stride + bin(&exit), weight);
+            }
+        }
+    });
+    let (_, radius) = body.ball();
+    let flux = match light {
+        Light::Directional(_) => PI * radius * radius,
+        Light::Uniform => 4.0 * PI * PI * radius * radius,
+    };
+    let result = |row: usize| Exitance {
+        bins: (0..bins).map(|bin| tally.estimate(row * stride + bin).scaled(flux)).collect(),
+        scattered: tally.estimate(row * stride + bins).scaled(flux),
+        straight: tally.estimate(row * stride + bins + 1).scaled(flux),
+        entered: tally.estimate(all).scaled(flux),
+        lost: tally.lost as f64 / paths as f64,
+    };
+    (0..absorptions.len()).map(result).collect()
+}
+
+/// Where and in which direction inside a path enters, if it meets the body and is not reflected.
+fn enter(body: &impl Body, ior: f64, light: Light, random: &mut Random) -> Option<(DVec3, DVec3)> {
+    let travel = match light {
+        Light::Directional(direction) => direction,
+        Light::Uniform => random.direction(),
+    };
+    let origin = disk(body, travel, random.next(), random.next());
+    let (distance, normal, _) = body.enter(origin, travel)?;
+    let inside = entered(ior, travel, normal, random)?;
+    Some((origin + travel * distance, inside))
+}
+
+/// A point of the disk across `travel` in front of the body, uniform for two uniform numbers in [0, 1).
+fn disk(body: &impl Body, travel: DVec3, u: f64, v: f64) -> DVec3 {
+    let (centre, radius) = body.ball();
+    let (t, b) = travel.any_orthonormal_pair();
+    let (s, c) = (TAU * v).sin_cos();
+    // The start is outside of the ball, not on it.
+    centre + radius * (u.sqrt() * (c * t + s * b) - 1.001 * travel)
+}
+
+/// How much each bin counts in the mean over what a camera at infinity sees: its visible area times cosine and Ft, since
+/// the light towards a direction is exitance x Ft / (pi (1 - rho_e)).
+///
+/// `forward` is the unit vector of view; `bin` maps position and place. By `rays` x `rays` rays over the disk.
+pub fn seen(
+    body: &impl Body,
+    ior: f64,
+    forward: DVec3,
+    bins: usize,
+    bin: impl Fn(DVec3, usize) -> usize,
+    rays: u32,
+) -> Vec<f64> {
+    let mut weights = vec![0.0; bins];
+    let place = |i: u32| (f64::from(i) + 0.5) / f64::from(rays);
+    for (i, j) in (0..rays).flat_map(|i| (0..rays).map(move |j| (i, j))) {
+        let origin = disk(body, forward, place(i), place(j));
+        if let Some((distance, normal, part)) = body.enter(origin, forward) {
+            let (reflectance, _) = super::interface(ior, (-forward.dot(normal)).max(0.0));
+            weights[bin(origin + forward * distance, part)] += 1.0 - reflectance;
+        }
+    }
+    weights
+}
