@@ -5,7 +5,7 @@
 use glam::{DVec3, dvec3};
 use std::f64::consts::{LN_2, PI};
 use translucent::reference::boundary::{Side, diffuse_reflectance, fresnel};
-use translucent::reference::walk::exitance::{Exitance, Light, exitance, seen};
+use translucent::reference::walk::exitance::{Bins, Exitance, Light, exitance, seen};
 use translucent::reference::walk::mesh::Mesh;
 use translucent::reference::walk::searchlight::{Incidence, Searchlight, searchlight};
 use translucent::reference::walk::shape::{Body, Slab, Sphere};
@@ -151,7 +151,8 @@ fn sphere(
 ) -> Vec<Exitance> {
     let radius = body.ball().1;
     let band = move |z: f64| (((1.0 - z / radius) / 2.0 * bands as f64).max(0.0) as usize).min(bands - 1);
-    exitance(body, matter, absorptions, light, bands, |exit| band(exit.position.z), paths, 5)
+    let bins = Bins { count: bands, of: &|p, _| band(p.z) };
+    exitance(body, matter, absorptions, light, bins, paths, 5)
 }
 
 const DOWN: Light = Light::Directional(DVec3::NEG_Z);
@@ -165,7 +166,7 @@ fn entering_flux_is_the_fresnel_average() {
     let matter = Matter { sigma_s: 0.1, sigma_a: 100.0, g: 0.0, ior };
     let found = &sphere(&Sphere { radius: 2.0 }, matter, &[100.0], 1, DOWN, 40_000)[0];
     close(found.entered, 4.0 * PI * share, 0.0, "sphere");
-    let uniform = exitance(&cube, matter, &[100.0], Light::Uniform, 1, |_| 0, 40_000, 6);
+    let uniform = exitance(&cube, matter, &[100.0], Light::Uniform, Bins { count: 1, of: &|_, _| 0 }, 40_000, 6);
     close(uniform[0].entered, PI * cube.area() * share, 0.0, "cube");
 }
 
@@ -203,7 +204,8 @@ fn skin_on_a_ball() {
 fn a_camera_sees_a_sphere_evenly() {
     // Bands about an axis across the view: the visible area and cosine of equal-area bands from the front pole,
     // without a boundary.
-    let weights = seen(&Sphere { radius: 1.0 }, 1.0, DVec3::NEG_Z, 4, |p, _| ((1.0 - p.z) * 2.0) as usize, 400);
+    let bins = Bins { count: 4, of: &|p, _| ((1.0 - p.z) * 2.0) as usize };
+    let weights = seen(&Sphere { radius: 1.0 }, 1.0, DVec3::NEG_Z, bins, 400);
     let total: f64 = weights.iter().sum();
     for (weight, expected) in weights.iter().zip([0.75, 0.25, 0.0, 0.0]) {
         assert!((weight / total - expected).abs() < 2e-3, "{weights:?}");

@@ -1,7 +1,7 @@
 //! A body in the light: what leaves each part of its surface.
 
 use super::shape::Body;
-use super::{End, Estimate, Exit, Matter, Random, Tally, entered, walk};
+use super::{End, Estimate, Matter, Random, Tally, entered, walk};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
@@ -12,6 +12,14 @@ pub enum Light {
     Directional(DVec3),
     /// Radiance 1 from everywhere.
     Uniform,
+}
+
+/// How a surface is divided.
+#[derive(Clone, Copy)]
+pub struct Bins<'a> {
+    pub count: usize,
+    /// The bin of a position and the shape's place there.
+    pub of: &'a (dyn Fn(DVec3, usize) -> usize + Sync),
 }
 
 /// Flux [irradiance x area], by sigma_a.
@@ -30,7 +38,7 @@ pub struct Exitance {
 }
 
 /// Follows `paths` paths from the light and weighs them for each of `absorptions` (sigma_a [1/length]; that of `matter`
-/// is ignored). `bin` says to which of `bins` parts of the surface an exit belongs.
+/// is ignored).
 ///
 /// Paths start uniformly in a disk across the light that covers the body, so shadows that it casts on itself are in.
 pub fn exitance(
@@ -38,14 +46,14 @@ pub fn exitance(
     matter: Matter,
     absorptions: &[f64],
     light: Light,
-    bins: usize,
-    bin: impl Fn(&Exit) -> usize + Sync,
+    bins: Bins,
     paths: u64,
     seed: u64,
 ) -> Vec<Exitance> {
     let least = absorptions.iter().copied().fold(f64::INFINITY, f64::min);
     let matter = Matter { sigma_a: least, ..matter };
-    let stride = bins + 2;
+    let Bins { count, of } = bins;
+    let stride = count + 2;
     let all = stride * absorptions.len();
     let tally = Tally::run(all + 1, paths, seed, |random, tally| {
         let Some((position, direction)) = enter(body, matter.ior, light, random) else { return };
@@ -61,10 +69,10 @@ pub fn exitance(
         for (row, &sigma_a) in absorptions.iter().enumerate() {
             let weight = exit.weight(sigma_a);
             if exit.scatterings == 0 {
-                tally.add(row * stride + bins + 1, weight);
+                tally.add(row * stride + count + 1, weight);
             } else {
-                tally.add(row * stride + bins, weight);
-                tally.add(row * stride + bin(&exit), weight);
+                tally.add(row * stride + count, weight);
+                tally.add(row * stride + of(exit.position, exit.place), weight);
             }
         }
     });
@@ -74,9 +82,9 @@ pub fn exitance(
         Light::Uniform => 4.0 * PI * PI * radius * radius,
     };
     let result = |row: usize| Exitance {
-        bins: (0..bins).map(|bin| tally.estimate(row * stride + bin).scaled(flux)).collect(),
-        scattered: tally.estimate(row * stride + bins).scaled(flux),
-        straight: tally.estimate(row * stride + bins + 1).scaled(flux),
+        bins: (0..count).map(|bin| tally.estimate(row * stride + bin).scaled(flux)).collect(),
+        scattered: tally.estimate(row * stride + count).scaled(flux),
+        straight: tally.estimate(row * stride + count + 1).scaled(flux),
         entered: tally.estimate(all).scaled(flux),
         lost: tally.lost as f64 / paths as f64,
     };
@@ -107,22 +115,15 @@ fn disk(body: &impl Body, travel: DVec3, u: f64, v: f64) -> DVec3 {
 /// How much each bin counts in the mean over what a camera at infinity sees: its visible area times cosine and Ft, since
 /// the light towards a direction is exitance x Ft / (pi (1 - rho_e)).
 ///
-/// `forward` is the unit vector of view; `bin` maps position and place. By `rays` x `rays` rays over the disk.
-pub fn seen(
-    body: &impl Body,
-    ior: f64,
-    forward: DVec3,
-    bins: usize,
-    bin: impl Fn(DVec3, usize) -> usize,
-    rays: u32,
-) -> Vec<f64> {
-    let mut weights = vec![0.0; bins];
+/// `forward` is the unit vector of view. By `rays` x `rays` rays over the disk.
+pub fn seen(body: &impl Body, ior: f64, forward: DVec3, bins: Bins, rays: u32) -> Vec<f64> {
+    let mut weights = vec![0.0; bins.count];
     let place = |i: u32| (f64::from(i) + 0.5) / f64::from(rays);
     for (i, j) in (0..rays).flat_map(|i| (0..rays).map(move |j| (i, j))) {
         let origin = disk(body, forward, place(i), place(j));
         if let Some((distance, normal, part)) = body.enter(origin, forward) {
             let (reflectance, _) = super::interface(ior, (-forward.dot(normal)).max(0.0));
-            weights[bin(origin + forward * distance, part)] += 1.0 - reflectance;
+            weights[(bins.of)(origin + forward * distance, part)] += 1.0 - reflectance;
         }
     }
     weights
