@@ -59,13 +59,15 @@
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
-//! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image |
+//! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
+//! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
 //! The program uses this public interface alone. There is no global state: devices and renderers stand side by side.
 
 pub mod error;
 pub mod gpu;
 pub mod image;
+pub mod inspect;
 pub mod prepare;
 pub mod reference;
 pub mod render;

@@ -3,7 +3,7 @@
 mod program;
 
 use clap::{Parser, Subcommand};
-use program::{merge::Merge, render::Render, tables};
+use program::{inspect::Inspect, merge::Merge, render::Render, tables};
 use std::process::ExitCode;
 
 /// Renders translucent matter (marble, skin, milk, wax) in glTF scenes with Vulkan compute.
@@ -22,6 +22,8 @@ struct Cli {
 enum Command {
     /// Render a glTF scene to an EXR image.
     Render(Box<Render>),
+    /// Say what a scene requires: matter, models, lights, kernels, buffers, and why.
+    Inspect(Box<Inspect>),
     /// Put the parts of a larger render together, weighted by samples.
     Merge(Merge),
     /// List every named material with its coefficients, mean free path and colour.
@@ -33,6 +35,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(render) => render.run(),
+        Command::Inspect(inspect) => inspect.run(),
         Command::Merge(merge) => merge.run(),
         Command::Presets => tables::presets(),
         Command::Devices => tables::devices(),

@@ -1,6 +1,7 @@
 //! What each command does, and how it ends.
 
 pub mod arguments;
+pub mod inspect;
 pub mod merge;
 pub mod render;
 pub mod scene;

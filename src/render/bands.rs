@@ -1,8 +1,8 @@
 //! How an image is cut into bands of rows that fit the device, and where a band's sums are.
 
+use super::Limits;
 use crate::{
     error::{Error, Result},
-    gpu::Device,
     prepare::Prepared,
     settings::Settings,
     shared::{BATCHES, Slot},
@@ -52,12 +52,12 @@ pub fn bytes_per_pixel(slot: Slot) -> u64 {
 }
 
 /// Cuts the rendered rows into bands of nearly equal size.
-pub fn split(device: &Device, prepared: &Prepared, settings: &Settings) -> Result<Vec<Band>> {
+pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result<Vec<Band>> {
     let slots = slots(prepared);
     let widest = slots.iter().map(|slot| bytes_per_pixel(*slot)).max().unwrap_or(1);
     let whole: u64 = slots.iter().map(|slot| bytes_per_pixel(*slot)).sum();
     // Half of the heap is left to the scene and to others.
-    let limit = (device.max_storage_buffer_range() / widest).min(device.heap_size() / 2 / whole);
+    let limit = (limits.buffer_bytes / widest).min(limits.heap_bytes / 2 / whole);
     let wanted = settings.band_pixels.unwrap_or(BAND_PIXELS).max(1);
     let width = prepared.view.crop_width;
     if u64::from(width) > limit {

@@ -2,6 +2,9 @@
 
 mod assemble;
 mod bands;
+mod plan;
+
+pub use plan::{BufferUse, KernelUse, Limits, Plan, value_name};
 
 use crate::{
     error::{Error, Result},
@@ -32,7 +35,7 @@ macro_rules! kernels {
 
         impl Kernels {
             fn new(layout: &Layout, prepared: &Prepared, workgroup: u32) -> Result<Kernels> {
-                Ok(Kernels { $($stem: match needs(prepared, stringify!($stem)) {
+                Ok(Kernels { $($stem: match plan::needs(prepared, stringify!($stem)).0 {
                     true => Some(Kernel::new(
                         layout,
                         stringify!($stem),
@@ -43,6 +46,10 @@ macro_rules! kernels {
                     false => None,
                 },)* })
             }
+
+            fn stems(&self) -> Vec<&'static str> {
+                [$(&self.$stem,)*].into_iter().flatten().map(Kernel::stem).collect()
+            }
         }
 
         /// Stem and SPIR-V of every kernel.
@@ -51,15 +58,6 @@ macro_rules! kernels {
     };
 }
 kernels!(primary, sample, reproject, accumulate, reflect, resolve);
-
-/// Whether anything in the scene needs a kernel.
-fn needs(prepared: &Prepared, stem: &str) -> bool {
-    match stem {
-        "sample" | "reproject" | "accumulate" => prepared.has_translucent,
-        "reflect" => prepared.has_reflection,
-        _ => true,
-    }
-}
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -125,15 +123,16 @@ impl Renderer {
             upload(device, &buffer, data)?;
             buffers.push((slot, buffer));
         }
-        let bands = bands::split(device, &prepared, settings)?;
+        let bands = bands::split(Limits::of(device), &prepared, settings)?;
         let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
-        for slot in bands::slots(&prepared) {
-            let bytes = bands::bytes_per_pixel(slot) * u64::from(pixels);
-            buffers.push((slot, Buffer::new(device, slot.name(), bytes, Location::Device)?));
+        for (slot, bytes) in plan::sizes(scene, &prepared, pixels) {
+            if buffers.iter().all(|(made, _)| *made != slot) {
+                buffers.push((slot, Buffer::new(device, slot.name(), bytes, Location::Device)?));
+            }
         }
-        let counters = Buffer::new(device, Slot::Counters.name(), 4, Location::Device)?;
-        upload(device, &counters, bytemuck::bytes_of(&0u32))?;
-        buffers.push((Slot::Counters, counters));
+        if let Some((_, counters)) = buffers.iter().find(|(slot, _)| *slot == Slot::Counters) {
+            upload(device, counters, bytemuck::bytes_of(&0u32))?;
+        }
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
         let bindings = Bindings::new(&layout, &bound)?;
         Ok(Renderer {
@@ -151,6 +150,16 @@ impl Renderer {
             strata: [None; BATCHES as usize],
             begin: None,
         })
+    }
+
+    /// The buffers on the device: slot and bytes.
+    pub fn buffers(&self) -> Vec<(Slot, u64)> {
+        self.buffers.iter().map(|(slot, buffer)| (*slot, buffer.bytes())).collect()
+    }
+
+    /// Stems of the kernels that were made.
+    pub fn kernels(&self) -> Vec<&'static str> {
+        self.kernels.stems()
     }
 
     /// What kernels read, but for the geometry.

@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod edge_cases;
+mod inspect;
 mod integrator;
 mod lights;
 mod repeatable;

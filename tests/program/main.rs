@@ -1,6 +1,7 @@
 //! The program as a user meets it, and the images that it writes.
 
 mod image;
+mod inspect;
 mod interrupt;
 mod merge;
 mod usage;

@@ -1,0 +1,147 @@
+//! What a scene and its settings require of a device, and why. [`Renderer`](super::Renderer) makes exactly this.
+
+use super::bands;
+use crate::{
+    error::Result,
+    gpu::Device,
+    prepare::{Prepared, prepare},
+    scene::Scene,
+    settings::Settings,
+    shared::{self, Slot},
+};
+
+/// What a device allows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most bytes of one buffer.
+    pub buffer_bytes: u64,
+    /// Bytes of the heap that buffers come from.
+    pub heap_bytes: u64,
+}
+
+impl Limits {
+    /// A device that allows everything.
+    pub const NONE: Limits = Limits { buffer_bytes: u64::MAX, heap_bytes: u64::MAX };
+
+    /// Those of a device.
+    pub fn of(device: &Device) -> Limits {
+        Limits { buffer_bytes: device.max_storage_buffer_range(), heap_bytes: device.heap_size() }
+    }
+}
+
+/// A kernel, and whether it is made and run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KernelUse {
+    pub stem: &'static str,
+    pub used: bool,
+    pub why: &'static str,
+}
+
+/// A buffer, and how large it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BufferUse {
+    pub slot: Slot,
+    /// 0 for one that is left out.
+    pub bytes: u64,
+    /// What it holds, or what the scene lacks that it would hold.
+    pub why: String,
+}
+
+/// Kernels, features, buffers and bands of a render.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub prepared: Prepared,
+    /// Every kernel, in the order in which they run.
+    pub kernels: Vec<KernelUse>,
+    /// Every slot, in order of binding.
+    pub buffers: Vec<BufferUse>,
+    /// Pixels of each band; the buffers have room for the largest.
+    pub bands: Vec<u32>,
+}
+
+impl Plan {
+    /// What [`Renderer::new`](super::Renderer::new) would make on a device of these limits.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`](super::Renderer::new), but for what only a device can tell.
+    pub fn new(scene: &Scene, settings: &Settings, limits: Limits) -> Result<Plan> {
+        let prepared = prepare(scene, settings)?;
+        let bands: Vec<u32> = bands::split(limits, &prepared, settings)?.iter().map(|band| band.pixels).collect();
+        let largest = bands.iter().copied().max().unwrap_or(0);
+        let kernels = super::SPIRV.iter().map(|&(stem, _)| {
+            let (used, why) = needs(&prepared, stem);
+            KernelUse { stem, used, why }
+        });
+        let kernels = kernels.collect();
+        let sizes = sizes(scene, &prepared, largest);
+        let buffers = Slot::ALL.iter().map(|&slot| {
+            let bytes = sizes.iter().find(|(s, _)| *s == slot).map_or(0, |(_, bytes)| *bytes);
+            let why = if bytes > 0 { slot.about().to_string() } else { absent(slot) };
+            BufferUse { slot, bytes, why }
+        });
+        let buffers = buffers.collect();
+        Ok(Plan { prepared, kernels, buffers, bands })
+    }
+
+    /// Bytes of all buffers on the device.
+    pub fn device_bytes(&self) -> u64 {
+        self.buffers.iter().map(|buffer| buffer.bytes).sum()
+    }
+
+    /// Bytes of the sums that wait on the host while other bands have the device.
+    pub fn waiting_bytes(&self) -> u64 {
+        if self.bands.len() == 1 {
+            return 0;
+        }
+        let kept = super::SUMS.into_iter().filter(|slot| self.buffers.iter().any(|b| b.slot == *slot && b.bytes > 0));
+        let each: u64 = kept.map(bands::bytes_per_pixel).sum();
+        self.bands.iter().map(|pixels| u64::from(*pixels) * each).sum()
+    }
+}
+
+/// Whether anything in the scene needs a kernel, and what does or would.
+pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
+    match stem {
+        "primary" => (true, "finds the surface that each pixel sees"),
+        "resolve" => (true, "makes means and variances of the sums"),
+        "sample" | "reproject" | "accumulate" => match prepared.has_translucent {
+            true => (true, "a surface is translucent"),
+            false => (false, "no surface is translucent"),
+        },
+        "reflect" => match prepared.has_reflection {
+            true => (true, "light can leave a first surface that it did not enter, or the environment is shown"),
+            false => (false, "no light can leave a first surface that it did not enter: delta lights on smooth matter"),
+        },
+        _ => (true, "always"),
+    }
+}
+
+/// Bytes of each buffer that a renderer makes, for a band of `pixels`.
+pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slot, u64)> {
+    let of_scene = super::scene_data(scene, prepared).into_iter().map(|(slot, data)| (slot, data.len() as u64));
+    let of_band =
+        bands::slots(prepared).into_iter().map(|slot| (slot, bands::bytes_per_pixel(slot) * u64::from(pixels)));
+    let counters = (prepared.features.counters != 0).then_some((Slot::Counters, 4));
+    of_scene.chain(of_band).chain(counters).collect()
+}
+
+/// Why a slot has no buffer.
+fn absent(slot: Slot) -> String {
+    let lacks = match slot {
+        Slot::Lights => "no delta light",
+        Slot::Environment | Slot::EnvironmentCdf => "no image as environment",
+        Slot::Probes | Slot::HitLists => "no surface is translucent",
+        Slot::BatchSums => "no variance is asked for",
+        Slot::Counters => "steps are counted in tests and benchmarks only",
+        _ => "nothing in the scene needs it",
+    };
+    lacks.into()
+}
+
+/// The name of a feature's value where it stands for one: `PROJECTION_MIS` for 0 of a feature that is "One of
+/// PROJECTION_*.".
+pub fn value_name(feature: &shared::NamedFeature) -> Option<&'static str> {
+    let prefix = feature.about.strip_prefix("One of ")?.trim_end_matches('.').strip_suffix('*')?;
+    let named = |(name, value): &&(&'static str, f64)| name.starts_with(prefix) && *value == f64::from(feature.value);
+    shared::CONSTANTS.iter().find(named).map(|(name, _)| *name)
+}
