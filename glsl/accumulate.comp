@@ -5,19 +5,26 @@
 #include "random.glsl"
 #include "pixel.glsl"
 #include "profile.glsl"
+#include "texture.glsl"
 #include "boundary.glsl"
 #include "projection.glsl"
 #include "intersect.glsl"
 #include "light.glsl"
 #include "sums.glsl"
 SHADINGS(readonly);
-MATERIALS(readonly);
 SURFACES(readonly);
 PROBES(readonly);
 HIT_LISTS(readonly);
 BATCH_SUMS(read_write);
 
-// Profile over density of the hit at xo + delta, where the camera projection's exponentials are combined.
+// Weights of the second and third vertex at a point of a triangle, from its corner.
+vec2 weights(Triangle triangle, vec3 from_corner) {
+    vec3 n = cross(triangle.edge1, triangle.edge2);
+    return vec2(dot(cross(from_corner, triangle.edge2), n), dot(cross(triangle.edge1, from_corner), n)) / dot(n, n);
+}
+
+// Profile over density of the hit at xo + delta, where the camera projection's exponentials are combined; m as it is
+// at that hit.
 vec3 camera_factor(Seen s, Material m, Probe probe, vec3 delta, vec3 n) {
     float q = camera_ratio(s, delta);
     vec3 d = probe.direction;
@@ -68,13 +75,15 @@ void main() {
     float total = 0.0;
     for (uint j = 0; j < kept; j++) {
         vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
-        vec3 n = geometric_normal(triangles[hit_lists[index].triangle[j]]);
+        uint triangle = hit_lists[index].triangle[j];
+        vec3 n = geometric_normal(triangles[triangle]);
+        Material local = textured_medium(m, triangle, weights(triangles[triangle], (s.position - triangles[triangle].corner) + delta));
         vec3 f;
         float p = 1.0;
         if (PROJECTION == PROJECTION_CAMERA) {
-            f = camera_factor(s, m, probe, delta, n);
+            f = camera_factor(s, local, probe, delta, n);
         } else {
-            f = m.strength * shape(m, dot(delta, delta));
+            f = local.strength * shape(local, dot(delta, delta));
             p = mixture_density(s, m, delta, n);
         }
         total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
@@ -90,17 +99,15 @@ void main() {
     vec3 delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
     uint lit = hit_lists[index].triangle[chosen];
     Triangle triangle = triangles[lit];
-    vec3 cross_edges = cross(triangle.edge1, triangle.edge2);
-    vec3 n = s.side * normalize(cross_edges);
-    vec3 f = PROJECTION == PROJECTION_CAMERA ? camera_factor(s, m, probe, delta, n)
-        : m.strength * shape(m, dot(delta, delta));
+    vec3 n = s.side * geometric_normal(triangle);
+    vec2 barycentric = weights(triangle, (s.position - triangle.corner) + delta);
+    Material local = textured_medium(m, lit, barycentric);
+    vec3 f = PROJECTION == PROJECTION_CAMERA ? camera_factor(s, local, probe, delta, n)
+        : local.strength * shape(local, dot(delta, delta));
     // f / p x total / (sum(f) / p): the density cancels.
     vec3 factor = f * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
 
-    vec3 from_corner = (s.position - triangle.corner) + delta;
-    vec2 barycentric = vec2(dot(cross(from_corner, triangle.edge2), cross_edges),
-        dot(cross(triangle.edge1, from_corner), cross_edges)) / dot(cross_edges, cross_edges);
-    vec3 shading_n = s.side * interpolated_normal(shadings[lit], barycentric);
+    vec3 shading_n = s.side * shading_normal(shadings[lit], lit, barycentric);
     vec3 position = s.position + delta;
 
     vec3 entering = vec3(0.0);
@@ -135,5 +142,10 @@ void main() {
     }
 
     vec3 radiance = transmittance(m.ior, dot(s.shading_normal, s.wo)) * factor * entering;
+    // The base colour tints what crosses the surface, there and here.
+    if (has_texture(TEXTURE_BASE_COLOR)) {
+        radiance *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb
+            * texture_value(TEXTURE_BASE_COLOR, surface.triangle, surface.barycentric).rgb;
+    }
     add_subsurface(index, radiance);
 }

@@ -112,6 +112,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
             float v = dot(ray.direction, q) * inv_determinant;
             float t = dot(triangle.edge2, q) * inv_determinant;
             bool hit = determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= ray.t_min && t <= t_max;
+            if (has_texture(TEXTURE_ALPHA)) hit = hit && solid(index, vec2(u, v));
             if (set != EVERY_SET) hit = hit && triangle.set == set;
             if (mode == ALL) {
                 uint n = hit_count + 1u;

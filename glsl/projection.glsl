@@ -12,13 +12,15 @@ struct Seen {
     float inverse_distance;
     // -1 where the camera sees the inner side: then the whole set is turned inside out.
     float side;
-    // Geometric and interpolated normal, towards the eye.
+    // Geometric and shading normal, towards the eye.
     vec3 normal;
     vec3 shading_normal;
 };
 
-vec3 interpolated_normal(Shading s, vec2 barycentric) {
-    return normalize(s.normal0 * (1.0 - barycentric.x - barycentric.y) + s.normal1 * barycentric.x + s.normal2 * barycentric.y);
+// Interpolated between the vertices, then turned by the normal map.
+vec3 shading_normal(Shading s, uint triangle, vec2 barycentric) {
+    vec3 n = normalize(s.normal0 * (1.0 - barycentric.x - barycentric.y) + s.normal1 * barycentric.x + s.normal2 * barycentric.y);
+    return mapped_normal(n, triangle, barycentric);
 }
 
 vec3 geometric_normal(Triangle t) {
@@ -37,8 +39,8 @@ Seen seen(View view, Surface surface, Triangle triangle, Shading shading) {
     vec3 n = geometric_normal(triangle);
     s.side = dot(n, s.wo) < 0.0 ? -1.0 : 1.0;
     s.normal = s.side * n;
-    s.shading_normal = s.side * interpolated_normal(shading, surface.barycentric);
-    // An interpolated normal may face away where the triangle does not.
+    s.shading_normal = s.side * shading_normal(shading, surface.triangle, surface.barycentric);
+    // A shading normal may face away where the triangle does not.
     if (!(dot(s.shading_normal, s.wo) > 0.0)) s.shading_normal = s.normal;
     return s;
 }

@@ -6,12 +6,12 @@
 #include "pixel.glsl"
 #include "boundary.glsl"
 #include "profile.glsl"
+#include "texture.glsl"
 #include "projection.glsl"
 #include "intersect.glsl"
 #include "light.glsl"
 #include "sums.glsl"
 SHADINGS(readonly);
-MATERIALS(readonly);
 SURFACES(readonly);
 
 // BRDF x cosine for directions in the frame where the shading normal is z.
@@ -61,7 +61,7 @@ void main() {
         radiance = environment_radiance(view, normalize(to));
     } else {
         Shading shading = shadings[surface.triangle];
-        Material m = materials[shading.material];
+        Material m = textured_surface(materials[shading.material], surface.triangle, surface.barycentric);
         Triangle triangle = triangles[surface.triangle];
         Seen s = seen(view, surface, triangle, shading);
         // Positions round as the vertices do, and opaque surfaces may reach far beyond the unit ball.

@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "texture.glsl"
 #include "intersect.glsl"
 SURFACES(readonly);
 PROBES(readonly);

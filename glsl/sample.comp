@@ -5,10 +5,10 @@
 #include "random.glsl"
 #include "pixel.glsl"
 #include "profile.glsl"
+#include "texture.glsl"
 #include "projection.glsl"
 TRIANGLES(readonly);
 SHADINGS(readonly);
-MATERIALS(readonly);
 SURFACES(readonly);
 PROBES(writeonly);
 

@@ -44,6 +44,32 @@ const uint LIGHT_POINT = 0u;
 const uint LIGHT_SPOT = 1u;
 // Light kind: direction and perpendicular irradiance [W/m^2].
 const uint LIGHT_DIRECTIONAL = 2u;
+// Kind of texture: base colour (sRGB).
+const uint TEXTURE_BASE_COLOR = 0u;
+// Kind of texture: metallic in blue, roughness in green.
+const uint TEXTURE_METALLIC_ROUGHNESS = 1u;
+// Kind of texture: normals in the tangent frame; `Texture::scale` multiplies x and y.
+const uint TEXTURE_NORMAL = 2u;
+// Kind of texture: emitted light (sRGB).
+const uint TEXTURE_EMISSION = 3u;
+// Kind of texture: multi-scatter colour (sRGB).
+const uint TEXTURE_SCATTER_COLOR = 4u;
+// Kind of texture: scatter strength in alpha.
+const uint TEXTURE_SCATTER_STRENGTH = 5u;
+// Kind of texture: a surface is where alpha times `Texture::scale` is at least 1.
+const uint TEXTURE_ALPHA = 6u;
+// Kinds of texture, each an entry of every material.
+const uint TEXTURE_KINDS = 7u;
+// Beyond the edge a texture repeats.
+const uint WRAP_REPEAT = 0u;
+// Beyond the edge a texture goes on with its last texel.
+const uint WRAP_CLAMP = 1u;
+// Beyond the edge a texture repeats in mirror images.
+const uint WRAP_MIRROR = 2u;
+// Steps of a material's ramp, along which textures move its medium.
+const uint RAMP = 256u;
+// GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
+const float MIRROR_ALPHA = 1e-6;
 // Dimension: radius.
 const uint DIM_RADIUS = 0u;
 // Dimension: angle in the tangent plane.
@@ -73,6 +99,8 @@ layout(constant_id = 2) const uint ENVIRONMENT_KIND = 0;
 layout(constant_id = 3) const uint BATCHED = 0;
 // 1 to count traversal steps (tests and benchmarks).
 layout(constant_id = 4) const uint COUNT_STEPS = 0;
+// Bit k is set where a material has a texture of kind k (TEXTURE_*).
+layout(constant_id = 7) const uint TEXTURED = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -194,6 +222,43 @@ struct Material {
     vec3 emission;
     // TRANSLUCENT or nothing.
     uint flags;
+    // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
+    uint ramp;
+};
+
+// One texture of a material. Texel (0, 0) is the upper left one, at the coordinates (0, 0).
+struct Texture {
+    // Texels in a row; 0 where the material has no texture of the kind.
+    uint width;
+    uint height;
+    // Its first word in Texels.
+    uint offset;
+    // 1 where red, green and blue are sRGB-encoded.
+    uint srgb;
+    // WRAP_* across and down.
+    uint wrap_u;
+    uint wrap_v;
+    // 1 to interpolate between texels, 0 to take the nearest.
+    uint linear;
+    // Which of a triangle's two coordinates it uses.
+    uint set;
+    // The rows of the affine map from the triangle's coordinates to the texture's.
+    vec3 row_u;
+    vec3 row_v;
+    // What its kind says.
+    float scale;
+};
+
+// What textures need to know of a triangle.
+struct Coordinates {
+    // Texture coordinates of the three vertices: set 0, then set 1.
+    vec2 uv[6];
+    // Direction of growing u at the vertices; 0 where there is none.
+    vec3 tangent[3];
+    // 1 or -1: the bitangent is this times normal x tangent.
+    float handedness;
+    // Index of the material.
+    uint material;
 };
 
 // A delta light.
@@ -299,5 +364,11 @@ struct Pixel {
 #define PIXELS(access) layout(set = 0, binding = 13, scalar) access buffer PixelsBlock { Pixel pixels[]; }
 // Largest number of traversal steps of any invocation, by atomicMax.
 #define COUNTERS(access) layout(set = 0, binding = 14, scalar) access buffer CountersBlock { uint counters[]; }
+// 256 numbers, the decoding of sRGB bytes; then the texels of all textures, red in the lowest byte, alpha in the highest.
+#define TEXELS(access) layout(set = 0, binding = 17, scalar) access buffer TexelsBlock { uint texels[]; }
+// TEXTURE_KINDS entries for each material.
+#define TEXTURES(access) layout(set = 0, binding = 18, scalar) access buffer TexturesBlock { Texture textures[]; }
+// Coordinates of each triangle.
+#define COORDINATES(access) layout(set = 0, binding = 19, scalar) access buffer CoordinatesBlock { Coordinates coordinates[]; }
 
 layout(push_constant, scalar) uniform StepBlock { Step step_; };

@@ -5,7 +5,7 @@ use crate::{
     reference::{Inputs, light, profile},
     scene::{Camera, EnvironmentMap, Frame, Lens, LightKind, Scene},
     settings::{Projection, Settings},
-    shared::{self, Features, Light, Material, View},
+    shared::{self, Features, Light, Material, Texture, View},
 };
 use glam::{DVec3, Vec3};
 
@@ -18,6 +18,9 @@ pub struct Prepared {
     pub lights: Vec<Light>,
     pub environment: Vec<Vec3>,
     pub environment_cdf: Vec<f32>,
+    /// Texels and textures as their slots hold them; none without textures.
+    pub texels: Vec<u32>,
+    pub textures: Vec<Texture>,
     /// The camera that looks, for what is said about the image.
     pub camera: Camera,
     /// Rows that are rendered: from the first, exclusive of the last.
@@ -43,6 +46,9 @@ impl Prepared {
             lights: &self.lights,
             environment: &self.environment,
             environment_cdf: &self.environment_cdf,
+            texels: &self.texels,
+            textures: &self.textures,
+            coordinates: &scene.coordinates,
         }
     }
 }
@@ -73,9 +79,6 @@ pub fn resolution(scene: &Scene, settings: &Settings) -> Result<(u32, u32)> {
 /// the profile is wide; above, its cubes leave f32. Matter outside is taken as one inside with the same albedo: its light
 /// moves by less than 1e-4 of the radius, or is as good as lost.
 const MEAN_FREE_PATH: (f64, f64) = (1.0 / (1 << 17) as f64, 1e9);
-
-/// GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
-const ALPHA_MIN: f64 = 1e-6;
 
 /// Longest side of an image (pixels).
 pub const MAX_SIDE: u32 = 65_536;
@@ -145,6 +148,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
             environment: kind,
             batches: u32::from(settings.variance),
             counters: 0,
+            textures: 0,
         },
         view,
         materials,
@@ -158,6 +162,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         lights,
         environment,
         environment_cdf,
+        texels: vec![],
+        textures: vec![],
         camera,
         rows: y0..y1,
     })
@@ -244,7 +250,7 @@ fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings
     };
     out.ior = material.ior as f32;
     let alpha = material.roughness * material.roughness;
-    out.alpha = if alpha < ALPHA_MIN { 0.0 } else { alpha as f32 };
+    out.alpha = if alpha < f64::from(shared::MIRROR_ALPHA) { 0.0 } else { alpha as f32 };
     out.base_color = material.base_color.as_vec3();
     out.metallic = material.metallic as f32;
     out.emission = material.emission.as_vec3();

@@ -213,6 +213,33 @@ constants! {
     /// Light kind: direction and perpendicular irradiance [W/m^2].
     LIGHT_DIRECTIONAL: u32 = 2;
 
+    /// Kind of texture: base colour (sRGB).
+    TEXTURE_BASE_COLOR: u32 = 0;
+    /// Kind of texture: metallic in blue, roughness in green.
+    TEXTURE_METALLIC_ROUGHNESS: u32 = 1;
+    /// Kind of texture: normals in the tangent frame; `Texture::scale` multiplies x and y.
+    TEXTURE_NORMAL: u32 = 2;
+    /// Kind of texture: emitted light (sRGB).
+    TEXTURE_EMISSION: u32 = 3;
+    /// Kind of texture: multi-scatter colour (sRGB).
+    TEXTURE_SCATTER_COLOR: u32 = 4;
+    /// Kind of texture: scatter strength in alpha.
+    TEXTURE_SCATTER_STRENGTH: u32 = 5;
+    /// Kind of texture: a surface is where alpha times `Texture::scale` is at least 1.
+    TEXTURE_ALPHA: u32 = 6;
+    /// Kinds of texture, each an entry of every material.
+    TEXTURE_KINDS: u32 = 7;
+    /// Beyond the edge a texture repeats.
+    WRAP_REPEAT: u32 = 0;
+    /// Beyond the edge a texture goes on with its last texel.
+    WRAP_CLAMP: u32 = 1;
+    /// Beyond the edge a texture repeats in mirror images.
+    WRAP_MIRROR: u32 = 2;
+    /// Steps of a material's ramp, along which textures move its medium.
+    RAMP: u32 = 256;
+    /// GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
+    MIRROR_ALPHA: f32 = 1e-6;
+
     /// Dimension: radius.
     DIM_RADIUS: u32 = 0;
     /// Dimension: angle in the tangent plane.
@@ -356,6 +383,43 @@ structs! {
         emission: Vec3,
         /// TRANSLUCENT or nothing.
         flags: u32,
+        /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
+        ramp: u32,
+    }
+
+    /// One texture of a material. Texel (0, 0) is the upper left one, at the coordinates (0, 0).
+    struct Texture {
+        /// Texels in a row; 0 where the material has no texture of the kind.
+        width: u32,
+        height: u32,
+        /// Its first word in Texels.
+        offset: u32,
+        /// 1 where red, green and blue are sRGB-encoded.
+        srgb: u32,
+        /// WRAP_* across and down.
+        wrap_u: u32,
+        wrap_v: u32,
+        /// 1 to interpolate between texels, 0 to take the nearest.
+        linear: u32,
+        /// Which of a triangle's two coordinates it uses.
+        set: u32,
+        /// The rows of the affine map from the triangle's coordinates to the texture's.
+        row_u: Vec3,
+        row_v: Vec3,
+        /// What its kind says.
+        scale: f32,
+    }
+
+    /// What textures need to know of a triangle.
+    struct Coordinates {
+        /// Texture coordinates of the three vertices: set 0, then set 1.
+        uv: [Vec2; 6],
+        /// Direction of growing u at the vertices; 0 where there is none.
+        tangent: [Vec3; 3],
+        /// 1 or -1: the bitangent is this times normal x tangent.
+        handedness: f32,
+        /// Index of the material.
+        material: u32,
     }
 
     /// A delta light.
@@ -463,6 +527,12 @@ buffers! {
     Pixels = 13: PIXELS [Pixel] pixels;
     /// Largest number of traversal steps of any invocation, by atomicMax.
     Counters = 14: COUNTERS [u32] counters;
+    /// 256 numbers, the decoding of sRGB bytes; then the texels of all textures, red in the lowest byte, alpha in the highest.
+    Texels = 17: TEXELS [u32] texels;
+    /// TEXTURE_KINDS entries for each material.
+    Textures = 18: TEXTURES [Texture] textures;
+    /// Coordinates of each triangle.
+    Coordinates = 19: COORDINATES [Coordinates] coordinates;
 }
 
 features! {
@@ -474,6 +544,8 @@ features! {
     batches = 3: BATCHED,
     /// 1 to count traversal steps (tests and benchmarks).
     counters = 4: COUNT_STEPS,
+    /// Bit k is set where a material has a texture of kind k (TEXTURE_*).
+    textures = 7: TEXTURED,
 }
 
 /// The text of `glsl/shared.glsl`.

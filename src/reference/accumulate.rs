@@ -23,15 +23,15 @@ use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::pixel::position;
 use super::projection::{
-    Seen, geometric_normal, interpolated_normal, inverse_scale, material, mixture_density, seen, shapes,
+    Seen, geometric_normal, inverse_scale, material, mixture_density, seen, shading_normal, shapes,
 };
 use super::random::{batch, key, scramble, sobol, unit};
 use super::sample::coordinate;
 use super::sums::Contribution;
-use super::{Inputs, intersect};
+use super::{Inputs, intersect, texture};
 use crate::shared::{
     BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, Material, PROJECTION_CAMERA, Probe,
-    SHADOW_OFFSET, Step, Surface,
+    SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -50,7 +50,7 @@ pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, 
 /// 1 if nothing is between a point and `distance` along `wi`, else 0. `normal` is the geometric one.
 pub(super) fn visibility(inputs: &Inputs, point: DVec3, normal: DVec3, wi: DVec3, distance: f64) -> f64 {
     let origin = point + normal * f64::from(SHADOW_OFFSET);
-    if intersect::any(inputs.triangles, origin, wi, 0.0, distance) { 0.0 } else { 1.0 }
+    if intersect::any(inputs, origin, wi, 0.0, distance) { 0.0 } else { 1.0 }
 }
 
 /// The contribution of the step's rays to pixel `index` of the band.
@@ -73,8 +73,15 @@ pub fn accumulate(
     let ior = f64::from(material.ior);
     let point = surface.position.as_dvec3() + delta(probe, hits, chosen);
     let entry = Entry::new(inputs, ior, seen.side, point, hits.triangle[chosen]);
-    let leaving = transmittance(ior, seen.shading_normal.dot(seen.wo));
+    let leaving = entry.tint
+        * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
+        * transmittance(ior, seen.shading_normal.dot(seen.wo));
     Contribution::of(leaving * factor * entering_light(inputs, step, index, &entry))
+}
+
+/// The base colour's texture, which tints what crosses the surface; the factor is in the profile's strength.
+fn tint(inputs: &Inputs, triangle: u32, barycentric: DVec2) -> DVec3 {
+    texture::value(inputs, TEXTURE_BASE_COLOR, triangle, barycentric).truncate()
 }
 
 /// From xo to hit `j`.
@@ -93,16 +100,22 @@ pub fn choose(
     hits: &Hits,
 ) -> Option<(usize, DVec3)> {
     let normal = |j: usize| seen.side * geometric_normal(&inputs.triangles[hits.triangle[j] as usize]);
+    // The matter as it is where hit j lets light in.
+    let local = |j: usize| {
+        let shape = &inputs.triangles[hits.triangle[j] as usize];
+        let point = seen.position + delta(probe, hits, j);
+        texture::medium(inputs, material, hits.triangle[j], barycentric(shape, point))
+    };
     if inputs.features.projection == PROJECTION_CAMERA {
-        return Some((0, given_factor(material, seen, probe, delta(probe, hits, 0), normal(0))));
+        return Some((0, given_factor(&local(0), seen, probe, delta(probe, hits, 0), normal(0))));
     }
     let stored = hits.count.min(MAX_HITS) as usize;
-    let strength = material.strength.as_dvec3();
     let terms: Vec<(DVec3, f64)> = (0..stored)
         .map(|j| {
             let delta = delta(probe, hits, j);
             let p = mixture_density(inputs.features.projection, material, seen, delta, normal(j));
-            let f = strength * shapes(material, delta.length());
+            let local = local(j);
+            let f = local.strength.as_dvec3() * shapes(&local, delta.length());
             if p > 0.0 { (f / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
         })
         .collect();
@@ -145,14 +158,16 @@ struct Entry {
     /// Interpolated normal on that side.
     shading: DVec3,
     ior: f64,
+    /// Base colour where the light crosses the surface.
+    tint: DVec3,
 }
 
 impl Entry {
     fn new(inputs: &Inputs, ior: f64, side: f64, point: DVec3, triangle: u32) -> Entry {
         let shape = &inputs.triangles[triangle as usize];
-        let weights = barycentric(point - shape.corner.as_dvec3(), shape.edge1.as_dvec3(), shape.edge2.as_dvec3());
-        let shading = side * interpolated_normal(inputs, triangle, weights);
-        Entry { point, normal: side * geometric_normal(shape), shading, ior }
+        let weights = barycentric(shape, point);
+        let shading = side * shading_normal(inputs, triangle, weights);
+        Entry { point, normal: side * geometric_normal(shape), shading, ior, tint: tint(inputs, triangle, weights) }
     }
 
     /// Ft(wi) cos; 0 below either horizon.
@@ -198,8 +213,10 @@ fn environment_direction(inputs: &Inputs, normal: DVec3, u1: f64, u2: f64) -> (D
     (wi, 0.5 * light::environment_pdf(inputs, wi) + 0.5 * cosine_pdf(wi))
 }
 
-/// Weights of the second and third vertex of the point `corner + p` in the plane of a triangle.
-fn barycentric(p: DVec3, edge1: DVec3, edge2: DVec3) -> DVec2 {
+/// Weights of the second and third vertex of a point in the plane of a triangle.
+fn barycentric(triangle: &Triangle, point: DVec3) -> DVec2 {
+    let (edge1, edge2) = (triangle.edge1.as_dvec3(), triangle.edge2.as_dvec3());
+    let p = point - triangle.corner.as_dvec3();
     let normal = edge1.cross(edge2);
     let scale = normal.length_squared();
     DVec2::new(p.cross(edge2).dot(normal) / scale, edge1.cross(p).dot(normal) / scale)

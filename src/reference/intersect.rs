@@ -3,6 +3,7 @@
 //! T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection", J. Graphics Tools 2 (1997): with the
 //! origin o = corner + u edge1 + v edge2 - t d, Cramer's rule gives t, u and v. Both faces of a triangle are hit.
 
+use super::{Inputs, texture};
 use crate::shared::Triangle;
 use glam::{DVec2, DVec3};
 
@@ -32,26 +33,22 @@ pub fn line(triangle: &Triangle, origin: DVec3, direction: DVec3) -> Option<(f64
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| (edge2.dot(q) / determinant, DVec2::new(u, v)))
 }
 
-/// Every hit with t in [t_min, t_max], in the order of the triangles.
-pub fn hits(
-    triangles: &[Triangle],
-    origin: DVec3,
-    direction: DVec3,
-    t_min: f64,
-    t_max: f64,
-) -> impl Iterator<Item = Hit> {
-    triangles.iter().enumerate().filter_map(move |(index, triangle)| {
+/// Every hit with t in [t_min, t_max] where there is a surface, in the order of the triangles.
+pub fn hits(inputs: &Inputs, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> impl Iterator<Item = Hit> {
+    inputs.triangles.iter().enumerate().filter_map(move |(index, triangle)| {
         let (t, barycentric) = line(triangle, origin, direction)?;
-        (t >= t_min && t <= t_max).then_some(Hit { t, triangle: index as u32, barycentric })
+        let index = index as u32;
+        let hit = t >= t_min && t <= t_max && texture::solid(inputs, index, barycentric);
+        hit.then_some(Hit { t, triangle: index, barycentric })
     })
 }
 
 /// The hit with the smallest t.
-pub fn closest(triangles: &[Triangle], origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<Hit> {
-    hits(triangles, origin, direction, t_min, t_max).min_by(|a, b| a.t.total_cmp(&b.t))
+pub fn closest(inputs: &Inputs, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<Hit> {
+    hits(inputs, origin, direction, t_min, t_max).min_by(|a, b| a.t.total_cmp(&b.t))
 }
 
 /// Whether anything is hit.
-pub fn any(triangles: &[Triangle], origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> bool {
-    hits(triangles, origin, direction, t_min, t_max).next().is_some()
+pub fn any(inputs: &Inputs, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> bool {
+    hits(inputs, origin, direction, t_min, t_max).next().is_some()
 }

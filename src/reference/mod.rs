@@ -20,10 +20,12 @@ pub mod reproject;
 pub mod resolve;
 pub mod sample;
 pub mod sums;
+pub mod texture;
 pub mod walk;
 
 use crate::shared::{
-    BATCHES, ENVIRONMENT_NONE, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Triangle, View,
+    BATCHES, Coordinates, ENVIRONMENT_NONE, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Texture,
+    Triangle, View,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -43,6 +45,10 @@ pub struct Inputs<'a> {
     pub environment: &'a [Vec3],
     /// Its sampling table; see [`Slot::EnvironmentCdf`](crate::shared::Slot::EnvironmentCdf).
     pub environment_cdf: &'a [f32],
+    /// Texels, textures and coordinates as their [slots](crate::shared::Slot) hold them; empty in scenes without textures.
+    pub texels: &'a [u32],
+    pub textures: &'a [Texture],
+    pub coordinates: &'a [Coordinates],
 }
 
 impl Inputs<'_> {

@@ -39,7 +39,7 @@ pub fn camera_ray(view: &View, step: &Step, index: u32) -> CameraRay {
 /// The first surface of pixel `index` of the band.
 pub fn primary(inputs: &Inputs, step: &Step, index: u32) -> Surface {
     let ray = camera_ray(inputs.view, step, index);
-    match intersect::closest(inputs.triangles, ray.origin, ray.direction, -ray.reach, f64::INFINITY) {
+    match intersect::closest(inputs, ray.origin, ray.direction, -ray.reach, f64::INFINITY) {
         None => Surface { triangle: MISS, ..Default::default() },
         Some(hit) => {
             let triangle = &inputs.triangles[hit.triangle as usize];

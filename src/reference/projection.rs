@@ -26,6 +26,7 @@
 use super::Inputs;
 use super::math::basis;
 use super::profile::Dipole;
+use super::texture;
 use crate::shared::{Material, PROJECTION_CAMERA, PROJECTION_NORMAL, Surface, Triangle};
 use glam::DVec3;
 
@@ -41,6 +42,8 @@ const FADE: f64 = 0.3;
 /// A surface as the camera sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
+    /// xo.
+    pub position: DVec3,
     /// Unit vector to the eye.
     pub wo: DVec3,
     /// Distance to the eye, or to an orthographic camera's plane.
@@ -51,7 +54,7 @@ pub struct Seen {
     pub side: f64,
     /// Geometric normal on the camera's side.
     pub normal: DVec3,
-    /// Interpolated normal on that side; the geometric one where the interpolated one faces away.
+    /// Shading normal on that side; the geometric one where it faces away.
     pub shading_normal: DVec3,
     /// Axes N, U, V: the normal and two tangents.
     pub axes: [DVec3; 3],
@@ -62,14 +65,15 @@ pub fn geometric_normal(triangle: &Triangle) -> DVec3 {
     triangle.edge1.as_dvec3().cross(triangle.edge2.as_dvec3()).normalize()
 }
 
-/// Interpolated unit normal of triangle `index`, out of the matter.
-pub fn interpolated_normal(inputs: &Inputs, index: u32, barycentric: glam::DVec2) -> DVec3 {
+/// Shading normal of triangle `index`, out of the matter: interpolated between the vertices, then turned by the normal
+/// map.
+pub fn shading_normal(inputs: &Inputs, index: u32, barycentric: glam::DVec2) -> DVec3 {
     let shading = &inputs.shadings[index as usize];
     let (b1, b2) = (barycentric.x, barycentric.y);
     let sum = shading.normal0.as_dvec3() * (1.0 - b1 - b2)
         + shading.normal1.as_dvec3() * b1
         + shading.normal2.as_dvec3() * b2;
-    sum.normalize()
+    texture::mapped_normal(inputs, sum.normalize(), index, barycentric)
 }
 
 /// What the camera sees of a surface that it hit.
@@ -85,10 +89,11 @@ pub fn seen(inputs: &Inputs, surface: &Surface) -> Seen {
     let outward = geometric_normal(&inputs.triangles[surface.triangle as usize]);
     let side = if outward.dot(wo) < 0.0 { -1.0 } else { 1.0 };
     let normal = side * outward;
-    let interpolated = side * interpolated_normal(inputs, surface.triangle, surface.barycentric.as_dvec2());
-    let shading_normal = if interpolated.dot(wo) > 0.0 { interpolated } else { normal };
+    let shading = side * shading_normal(inputs, surface.triangle, surface.barycentric.as_dvec2());
+    let shading_normal = if shading.dot(wo) > 0.0 { shading } else { normal };
     let (u, v) = basis(normal);
     Seen {
+        position: surface.position.as_dvec3(),
         wo,
         eye_distance,
         inverse_distance: perspective / to.length(),

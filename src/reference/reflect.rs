@@ -14,7 +14,7 @@ use super::math::{basis, cosine_direction, from_local};
 use super::primary::camera_ray;
 use super::projection::{Seen, material, seen};
 use super::sums::Contribution;
-use super::{Inputs, boundary};
+use super::{Inputs, boundary, texture};
 use crate::shared::{DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Surface, TRANSLUCENT};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -27,7 +27,9 @@ pub fn reflect(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> C
         return Contribution::of(if shown { light::environment(inputs, direction) } else { DVec3::ZERO });
     }
     let seen = seen(inputs, surface);
-    let lobe = Lobe::new(material(inputs, surface), &seen);
+    let material =
+        texture::surface(inputs, material(inputs, surface), surface.triangle, surface.barycentric.as_dvec2());
+    let lobe = Lobe::new(&material, &seen);
     let emitted = if step.first != 0 { lobe.material.emission.as_dvec3() } else { DVec3::ZERO };
     let rays = step.ray_begin..step.ray_begin + step.ray_count;
     let reflected: DVec3 = rays.map(|k| ray(inputs, step, index, surface, &seen, &lobe, k)).sum();

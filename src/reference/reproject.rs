@@ -23,7 +23,7 @@ pub fn reproject(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, pr
     let set = inputs.triangles[surface.triangle as usize].set;
     let origin = surface.position.as_dvec3() + probe.offset.as_dvec3();
     let direction = probe.direction.as_dvec3();
-    let all = intersect::hits(inputs.triangles, origin, direction, probe.t_min.into(), probe.t_max.into())
+    let all = intersect::hits(inputs, origin, direction, probe.t_min.into(), probe.t_max.into())
         .filter(|hit| inputs.triangles[hit.triangle as usize].set == set);
 
     let mut kept: Vec<intersect::Hit> = Vec::new();

@@ -358,6 +358,9 @@ fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u
         (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
         (Slot::Environment, bytemuck::cast_slice(&prepared.environment)),
         (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
+        (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),
+        (Slot::Textures, bytemuck::cast_slice(&prepared.textures)),
+        (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
     ]
     .into_iter()
     .filter(|(_, data)| !data.is_empty())

@@ -10,8 +10,11 @@ use std::io::Read;
 /// Most elements of an accessor that no bytes back: a guard against files that ask for memory out of nothing.
 const UNBACKED_LIMIT: usize = 1 << 24;
 
-const COMPRESSED: &str = "is compressed, which is not supported: decode it first, for example by importing the file \
-    into Blender and exporting it without compression";
+/// How to decode compressed geometry.
+pub(super) const DECODE: &str = "decode the file first: `gltf-transform cp IN.glb OUT.glb`, or import it into Blender and \
+    export it without compression";
+/// Extensions that compress what a view holds.
+const VIEW_COMPRESSIONS: &[&str] = &["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// The bytes of a file's buffers and the lists that point into them.
 pub(super) struct Arrays<'a> {
@@ -78,10 +81,12 @@ impl<'a> Arrays<'a> {
     pub fn new(root: &Item<'a>, binary: Option<&'a [u8]>) -> Result<Self> {
         let mut buffers = Vec::new();
         for (index, item) in root.list("buffers")?.iter().enumerate() {
-            if item.extension("EXT_meshopt_compression")?.is_some() {
-                return Err(item.error(COMPRESSED));
-            }
             let length = item.need("byteLength")?.whole()?;
+            if item.get("uri")?.is_none() && compression(item)?.is_some() {
+                // The place of decoded data, which whoever asks for them is told.
+                buffers.push(Cow::Borrowed(&[][..]));
+                continue;
+            }
             let mut bytes = match item.get("uri")? {
                 Some(uri) => Cow::Owned(fetch(&uri, length)?),
                 None if index == 0 && binary.is_some() => Cow::Borrowed(binary.unwrap_or_default()),
@@ -99,15 +104,40 @@ impl<'a> Arrays<'a> {
         Ok(Arrays { buffers, views: root.list("bufferViews")?, accessors: root.list("accessors")? })
     }
 
+    /// The elements of an accessor of `N` components of any type, named `kind`.
+    pub fn numbers<const N: usize>(&self, reference: &Item, kind: &str) -> Result<Vec<[f64; N]>> {
+        let item = self.accessor(reference, kind)?;
+        let normalized = item.get("normalized")?.map_or(Ok(false), |flag| flag.boolean())?;
+        self.collect(&item, N, [0.0; N], |bytes, component| {
+            std::array::from_fn(|i| component.value(&bytes[i * component.size()..], normalized))
+        })
+    }
+
     /// The vectors of a VEC3 accessor, of any component type.
     pub fn vectors(&self, reference: &Item) -> Result<Vec<DVec3>> {
-        let item = self.accessor(reference, "VEC3")?;
-        let normalized = item.get("normalized")?.map_or(Ok(false), |flag| flag.boolean())?;
-        let vector = |bytes: &[u8], component: Component| {
-            let at = |axis: usize| component.value(&bytes[axis * component.size()..], normalized);
-            DVec3::new(at(0), at(1), at(2))
-        };
-        self.collect(&item, 3, DVec3::ZERO, vector)
+        Ok(self.numbers(reference, "VEC3")?.into_iter().map(DVec3::from_array).collect())
+    }
+
+    /// The extension that compresses what an accessor points at, if one does.
+    pub fn compression(&self, reference: &Item) -> Result<Option<&'static str>> {
+        let accessor = &self.accessors[reference.index(self.accessors.len(), "accessors")?];
+        let Some(view) = accessor.get("bufferView")? else { return Ok(None) };
+        compression(&self.views[view.index(self.views.len(), "bufferViews")?])
+    }
+
+    /// The bytes of a view.
+    pub fn view(&self, reference: &Item) -> Result<&[u8]> {
+        let view = &self.views[reference.index(self.views.len(), "bufferViews")?];
+        if let Some(extension) = compression(view)? {
+            return Err(view.error(format!("is compressed ({extension}), which is not supported: {DECODE}")));
+        }
+        let bytes = &self.buffers[view.need("buffer")?.index(self.buffers.len(), "buffers")?];
+        let offset = view.get("byteOffset")?.map_or(Ok(0), |offset| offset.whole())?;
+        let length = view.need("byteLength")?.whole()?;
+        offset
+            .checked_add(length)
+            .and_then(|end| bytes.get(offset..end))
+            .ok_or_else(|| view.error(format!("bytes {offset} + {length} reach beyond the buffer's {}", bytes.len())))
     }
 
     /// The numbers of a SCALAR accessor of unsigned integers.
@@ -170,16 +200,8 @@ impl<'a> Arrays<'a> {
             return Ok(Elements { bytes: None, count, stride: size, component });
         };
         let view = &self.views[reference.index(self.views.len(), "bufferViews")?];
-        if view.extension("EXT_meshopt_compression")?.is_some() || view.extension("KHR_meshopt_compression")?.is_some()
-        {
-            return Err(view.error(COMPRESSED));
-        }
-        let bytes = &self.buffers[view.need("buffer")?.index(self.buffers.len(), "buffers")?];
-        let offset = view.get("byteOffset")?.map_or(Ok(0), |offset| offset.whole())?;
-        let length = view.need("byteLength")?.whole()?;
-        let bytes = offset.checked_add(length).and_then(|end| bytes.get(offset..end)).ok_or_else(|| {
-            view.error(format!("bytes {offset} + {length} reach beyond the buffer's {}", bytes.len()))
-        })?;
+        let bytes = self.view(&reference)?;
+        let length = bytes.len();
         let stride = view.get("byteStride")?.map_or(Ok(size), |stride| stride.whole())?;
         if stride < size {
             return Err(view.error(format!("byteStride is {stride}, less than an element's {size} bytes")));
@@ -205,6 +227,16 @@ impl Elements<'_> {
     }
 }
 
+/// The extension that compresses a view or stands for a buffer of decoded data, if one does.
+fn compression(item: &Item) -> Result<Option<&'static str>> {
+    for name in VIEW_COMPRESSIONS {
+        if item.extension(name)?.is_some() {
+            return Ok(Some(name));
+        }
+    }
+    Ok(None)
+}
+
 /// A part of a sparse accessor, which must name its view.
 fn backed<'a>(item: Item<'a>) -> Result<Item<'a>> {
     item.need("bufferView")?;
@@ -212,7 +244,7 @@ fn backed<'a>(item: Item<'a>) -> Result<Item<'a>> {
 }
 
 /// The bytes behind a buffer's URI, `length` at most.
-fn fetch(uri: &Item, length: usize) -> Result<Vec<u8>> {
+pub(super) fn fetch(uri: &Item, length: usize) -> Result<Vec<u8>> {
     let text = uri.string()?;
     if let Some(data) = text.strip_prefix("data:") {
         let (_, encoded) =

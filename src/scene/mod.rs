@@ -32,6 +32,8 @@ pub struct Scene {
     pub triangles: Vec<shared::Triangle>,
     /// Normals and material of each triangle, in the same order.
     pub shadings: Vec<shared::Shading>,
+    /// Texture coordinates and tangents of each triangle, in the same order; none in a scene without textures.
+    pub coordinates: Vec<shared::Coordinates>,
     /// Compressed wide BVH over `triangles`, five words a node.
     pub nodes: Vec<glam::UVec4>,
     pub materials: Vec<Material>,
@@ -110,6 +112,7 @@ impl Scene {
             frame,
             triangles: order.iter().map(|&index| triangles[index as usize]).collect(),
             shadings: order.iter().map(|&index| shadings[index as usize]).collect(),
+            coordinates: vec![],
             nodes,
             materials,
             sets,

@@ -23,6 +23,9 @@ pub struct World {
     pub lights: Vec<Light>,
     pub environment: Vec<Vec3>,
     pub environment_cdf: Vec<f32>,
+    pub texels: Vec<u32>,
+    pub textures: Vec<Texture>,
+    pub coordinates: Vec<Coordinates>,
 }
 
 impl World {
@@ -40,7 +43,7 @@ impl World {
             environment_row2: Vec3::Z,
             ..Default::default()
         };
-        let features = Features { projection, environment: ENVIRONMENT_CONSTANT, batches: 1, counters: 0 };
+        let features = Features { projection, environment: ENVIRONMENT_CONSTANT, batches: 1, ..Features::default() };
         World { features, view, materials: vec![material], ..Default::default() }
     }
 
@@ -54,6 +57,9 @@ impl World {
             lights: &self.lights,
             environment: &self.environment,
             environment_cdf: &self.environment_cdf,
+            texels: &self.texels,
+            textures: &self.textures,
+            coordinates: &self.coordinates,
         }
     }
 

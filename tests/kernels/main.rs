@@ -53,7 +53,7 @@ pub fn bench() -> MutexGuard<'static, Bench> {
 impl Bench {
     /// What kernels read of `inputs`, and `buffers`, on the device.
     pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Loaded {
-        let fixed: [(Slot, &[u8]); 9] = [
+        let fixed: [(Slot, &[u8]); 12] = [
             (Slot::Views, bytemuck::bytes_of(inputs.view)),
             (Slot::Nodes, bytemuck::cast_slice(nodes)),
             (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
@@ -63,6 +63,9 @@ impl Bench {
             (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
             (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),
             (Slot::Counters, &[0; 4]),
+            (Slot::Texels, bytemuck::cast_slice(inputs.texels)),
+            (Slot::Textures, bytemuck::cast_slice(inputs.textures)),
+            (Slot::Coordinates, bytemuck::cast_slice(inputs.coordinates)),
         ];
         let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
         let make = |(slot, data): (Slot, &[u8])| {

@@ -62,6 +62,9 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         lights: &[],
         environment: &[],
         environment_cdf: &[],
+        texels: &[],
+        textures: &[],
+        coordinates: &[],
     };
     let mut bench = bench();
     bench.add("math", &compile(), &inputs.features);

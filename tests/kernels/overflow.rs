@@ -30,7 +30,7 @@ fn sheets() -> Case {
 fn probes(inputs: &Inputs) -> (Vec<Surface>, Vec<Probe>) {
     let at = |pixel: u32| {
         let origin = DVec3::new(0.02 * (f64::from(pixel % 8) - 3.7), 0.025 * (f64::from(pixel / 8) - 3.2), 2.0);
-        let hit = intersect::closest(inputs.triangles, origin, DVec3::NEG_Z, 0.0, 10.0).expect("the sheets are there");
+        let hit = intersect::closest(inputs, origin, DVec3::NEG_Z, 0.0, 10.0).expect("the sheets are there");
         let surface = Surface {
             position: (origin - hit.t * DVec3::Z).as_vec3(),
             triangle: hit.triangle,
@@ -63,7 +63,7 @@ fn long_lists_are_real_sorted_and_drawn_anew_for_each_sample() {
         .map(|(surface, probe)| {
             let origin = surface.position.as_dvec3() + probe.offset.as_dvec3();
             let (t_min, t_max) = (probe.t_min.into(), probe.t_max.into());
-            intersect::hits(inputs.triangles, origin, probe.direction.as_dvec3(), t_min, t_max).collect()
+            intersect::hits(&inputs, origin, probe.direction.as_dvec3(), t_min, t_max).collect()
         })
         .collect();
     let mut bench = bench();

@@ -40,6 +40,7 @@ fn densities_are_the_planes_over_the_jacobian() {
         let normal = dvec3(0.1, -0.2, 0.97).normalize();
         let (u, v) = basis(normal);
         let seen = Seen {
+            position: DVec3::ZERO,
             wo,
             eye_distance: 1.0 / inverse_distance,
             inverse_distance,
