@@ -123,7 +123,12 @@ impl<'a> Inspection<'a> {
                 },
             },
             "materials": self.materials.iter().map(material).collect::<Vec<_>>(),
-            "sets": scene.sets.iter().map(|set| json!({"name": set.name, "material": set.material})).collect::<Vec<_>>(),
+            "sets": scene.sets.iter().map(|set| json!({
+                "name": set.name,
+                "materials": set.materials,
+                "openEdges": set.open_edges,
+                "crowdedEdges": set.crowded_edges,
+            })).collect::<Vec<_>>(),
             "lights": scene.lights.iter().map(|light| json!({
                 "name": light.name,
                 "kind": light_kind(light.kind),

@@ -139,7 +139,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         return Err(Error::setting("environment", problem));
     }
 
-    let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some() == flag);
+    let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_some() == flag);
     let emits = scene.materials.iter().any(|m| m.emission != DVec3::ZERO);
     let rough = scene.materials.iter().any(|m| m.roughness > 0.0);
     Ok(Prepared {

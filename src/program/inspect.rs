@@ -11,7 +11,7 @@ use translucent::{
     Device, DeviceOptions,
     inspect::{Inspection, MatterReport, environment, light_kind, light_unit},
     render::{Limits, value_name},
-    scene::Lens,
+    scene::{Lens, Set},
 };
 
 #[derive(clap::Args)]
@@ -59,14 +59,21 @@ fn scene(inspection: &Inspection) -> String {
     if scene.dropped_triangles > 0 {
         let _ = write!(counts, "; {} without area were left out", scene.dropped_triangles);
     }
-    let sets: Vec<String> =
-        scene.sets.iter().map(|set| format!("{} ({})", set.name, scene.materials[set.material].name)).collect();
+    let sets: Vec<String> = scene.sets.iter().map(set).collect();
     text + &aligned(&[
         row(["  triangles", &counts]),
         row(["  surfaces that exchange light", &sets.join(", ")]),
         row(["  radius of the translucent part", &length(1.0 / scene.frame.scale)]),
         row(["  hash", &scene.hash]),
     ])
+}
+
+/// A set's name, and where its surface is not that of a closed body.
+fn set(set: &Set) -> String {
+    let edges = [("open edges", set.open_edges), ("edges of three triangles or more", set.crowded_edges)];
+    let edges: Vec<String> =
+        edges.iter().filter(|(_, count)| *count > 0).map(|(what, count)| format!("{count} {what}")).collect();
+    if edges.is_empty() { set.name.clone() } else { format!("{} ({})", set.name, edges.join(", ")) }
 }
 
 fn image(inspection: &Inspection) -> String {

@@ -83,7 +83,7 @@ impl SceneOptions {
             None => None,
         };
         let mut warnings = Vec::new();
-        if !scene.sets.iter().any(|set| scene.materials[set.material].medium.is_some()) {
+        if !scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_some()) {
             let names: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
             let names = names.join(", ");
             warnings.push(format!(

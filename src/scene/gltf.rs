@@ -96,7 +96,8 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
                 warnings.push(instancing.note("instances are not modelled; the mesh is shown once"));
             }
             let name = name.clone().unwrap_or_else(|| format!("node {index}"));
-            meshes.place(&Instance { node, name, transform, unit: options.unit }, &reference, &mut warnings)?;
+            let set = read_set(node)?;
+            meshes.place(&Instance { node, name, set, transform, unit: options.unit }, &reference, &mut warnings)?;
         }
         if let Some(reference) = node.get("camera")? {
             let list = root.list("cameras")?;
@@ -112,7 +113,7 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
             lights.push(read_light(node, item, name, transform, options.unit)?);
         }
     }
-    let (triangles, sets, dropped) = meshes.finish(&mut materials, &mut warnings);
+    let (triangles, sets, dropped) = meshes.finish(file, &mut materials, &mut warnings)?;
     if triangles.is_empty() {
         let dropped = if dropped == 0 { String::new() } else { format!(" but {dropped} of zero area") };
         return Err(Error::scene(file, "scene", format!("has no triangles{dropped}")));
@@ -238,6 +239,17 @@ fn local_transform(node: &Item) -> Result<DAffine3> {
         }
     };
     Ok(DAffine3::from_scale_rotation_translation(scale.into(), rotation, translation.into()))
+}
+
+/// The set that a node names: `extras.bssrdf.set`.
+fn read_set(node: &Item) -> Result<Option<String>> {
+    let Some(bssrdf) = material::extras_bssrdf(node)? else { return Ok(None) };
+    for key in bssrdf.keys()? {
+        if key != "set" {
+            return Err(bssrdf.error(format!("has an unknown member `{}`; a node's known: set", shorten(key))));
+        }
+    }
+    material::read_set(&bssrdf)
 }
 
 /// The direction in which `axis` of the node points, whatever the node's scale.

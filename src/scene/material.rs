@@ -37,6 +37,7 @@ const BSSRDF_KEYS: &[&str] = &[
     "g",
     "model",
     "surface",
+    "set",
 ];
 
 /// Models that a material may name.
@@ -66,6 +67,7 @@ pub(super) fn default_material() -> Material {
         emission: DVec3::ZERO,
         ior: DEFAULT_IOR,
         medium: None,
+        set: None,
     }
 }
 
@@ -84,8 +86,13 @@ pub(super) fn read(
     material.ior = authored_ior.unwrap_or(DEFAULT_IOR);
 
     let chosen = overrides.iter().rev().find(|(name, _)| *name == material.name);
-    let bssrdf = match item.find(&["extras"])? {
-        Some(extras) if extras.keys().is_ok() => extras.get("bssrdf")?,
+    let bssrdf = extras_bssrdf(item)?;
+    if let Some(bssrdf) = &bssrdf {
+        material.set = read_set(bssrdf)?;
+    }
+    // With a set alone, it says nothing about the matter.
+    let bssrdf = match bssrdf {
+        Some(bssrdf) if bssrdf.keys()? != ["set"] => Some(bssrdf),
         _ => None,
     };
     let scatter = item.extension("KHR_materials_scatter")?;
@@ -107,6 +114,23 @@ pub(super) fn read(
         warn_of_absorption(item, medium, warnings);
     }
     Ok(material)
+}
+
+/// `extras.bssrdf` of a material or a node; other extras may be anything.
+pub(super) fn extras_bssrdf<'a>(item: &Item<'a>) -> Result<Option<Item<'a>>> {
+    match item.find(&["extras"])? {
+        Some(extras) if extras.keys().is_ok() => extras.get("bssrdf"),
+        _ => Ok(None),
+    }
+}
+
+/// The name of the set that `extras.bssrdf` names.
+pub(super) fn read_set(bssrdf: &Item) -> Result<Option<String>> {
+    let Some(set) = bssrdf.get("set")? else { return Ok(None) };
+    if set.string()?.is_empty() {
+        return Err(set.error("must name a set, is empty"));
+    }
+    Ok(Some(set.string()?.to_string()))
 }
 
 /// Refuses an override whose material the file does not have, or whose preset we do not know.

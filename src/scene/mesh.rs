@@ -2,10 +2,12 @@
 
 use super::accessor::Arrays;
 use super::json::Item;
+use super::sets::{self, Group};
 use super::{Material, Set};
 use crate::Result;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::HashMap;
+use std::path::Path;
 use std::rc::Rc;
 
 /// Most triangles of a scene: their numbers, and those of the BVH's nodes, must fit into 32 bits.
@@ -26,13 +28,32 @@ pub(super) struct Triangle {
     /// Unit normals at the vertices.
     pub normals: [Vec3; 3],
     pub material: u32,
+    /// Index of the set; while meshes are placed, of the group.
     pub set: u32,
+    /// Indices of the placed vertices.
+    pub vertices: [u32; 3],
+    /// Whether its normals all pointed against its winding, and were turned.
+    pub opposed: bool,
+    /// Whether its winding was turned.
+    pub turned: bool,
+}
+
+impl Triangle {
+    /// Makes the other side the outer one.
+    pub fn turn(&mut self) {
+        std::mem::swap(&mut self.edge1, &mut self.edge2);
+        self.normals = [0, 2, 1].map(|corner| -self.normals[corner]);
+        self.vertices.swap(1, 2);
+        self.turned = !self.turned;
+    }
 }
 
 /// A node that shows a mesh.
 pub(super) struct Instance<'n, 'a> {
     pub node: &'n Item<'a>,
     pub name: String,
+    /// The set that the node names for its surfaces.
+    pub set: Option<String>,
     pub transform: &'n DAffine3,
     /// Metres of a unit of the file.
     pub unit: f64,
@@ -54,11 +75,11 @@ pub(super) struct Meshes<'r, 'a> {
     default_material: usize,
     loaded: HashMap<usize, Rc<Vec<Primitive<'a>>>>,
     vertices: usize,
+    /// Placed vertices (m).
+    positions: Vec<DVec3>,
     triangles: Vec<Triangle>,
-    sets: Vec<Set>,
+    groups: Vec<Group>,
     dropped: u64,
-    /// Triangles whose normals all point against their winding.
-    opposed: u64,
     /// Vertices of triangles below which their normal points.
     below: u64,
 }
@@ -72,10 +93,10 @@ impl<'r, 'a> Meshes<'r, 'a> {
             default_material,
             loaded: HashMap::new(),
             vertices: 0,
+            positions: Vec::new(),
             triangles: Vec::new(),
-            sets: Vec::new(),
+            groups: Vec::new(),
             dropped: 0,
-            opposed: 0,
             below: 0,
         })
     }
@@ -91,18 +112,19 @@ impl<'r, 'a> Meshes<'r, 'a> {
                 primitives
             }
         };
-        let mut sets: HashMap<usize, usize> = HashMap::new();
+        let mut groups: HashMap<usize, usize> = HashMap::new();
         for primitive in primitives.iter() {
-            let set = *sets.entry(primitive.material).or_insert_with(|| {
-                self.sets.push(Set { name: instance.name.clone(), material: primitive.material });
-                self.sets.len() - 1
+            let group = *groups.entry(primitive.material).or_insert_with(|| {
+                let (node, set) = (instance.name.clone(), instance.set.clone());
+                self.groups.push(Group { node, material: primitive.material, set });
+                self.groups.len() - 1
             });
-            self.place_primitive(instance, primitive, set as u32)?;
+            self.place_primitive(instance, primitive, group as u32)?;
         }
         Ok(())
     }
 
-    fn place_primitive(&mut self, instance: &Instance, primitive: &Primitive, set: u32) -> Result<()> {
+    fn place_primitive(&mut self, instance: &Instance, primitive: &Primitive, group: u32) -> Result<()> {
         if self.triangles.len() + primitive.corners.len() > TRIANGLES_MAX {
             return Err(instance.node.error(format!("the scene has more than {TRIANGLES_MAX} triangles")));
         }
@@ -110,6 +132,8 @@ impl<'r, 'a> Meshes<'r, 'a> {
         let translation = instance.transform.translation * instance.unit;
         let mirrored = linear.determinant() < 0.0;
         let normal_matrix = cofactors(&linear) * if mirrored { -1.0 } else { 1.0 };
+        let first = self.positions.len() as u32;
+        self.positions.extend(primitive.positions.iter().map(|&position| linear * position + translation));
         for corners in &primitive.corners {
             let mut order = corners.map(|corner| corner as usize);
             if mirrored {
@@ -128,12 +152,13 @@ impl<'r, 'a> Meshes<'r, 'a> {
                 continue;
             };
             let mut normals = [geometric.as_vec3(); 3];
+            let mut opposed = false;
             if let Some(authored) = &primitive.normals {
                 let mut authored = order.map(|corner| unit(normal_matrix * authored[corner]).unwrap_or(geometric));
                 if authored.iter().all(|normal| normal.dot(geometric) < 0.0) {
                     // The winding says where the matter is.
                     authored = authored.map(|normal| -normal);
-                    self.opposed += 1;
+                    opposed = true;
                 }
                 for (normal, authored) in normals.iter_mut().zip(authored) {
                     // Normals on both sides of a triangle could cancel between its vertices.
@@ -144,8 +169,17 @@ impl<'r, 'a> Meshes<'r, 'a> {
                     }
                 }
             }
-            let material = primitive.material as u32;
-            self.triangles.push(Triangle { corner, edge1, edge2, normals, material, set });
+            self.triangles.push(Triangle {
+                corner,
+                edge1,
+                edge2,
+                normals,
+                material: primitive.material as u32,
+                set: group,
+                vertices: order.map(|vertex| first + vertex as u32),
+                opposed,
+                turned: false,
+            });
         }
         Ok(())
     }
@@ -227,35 +261,38 @@ impl<'r, 'a> Meshes<'r, 'a> {
         Ok(Some(Primitive { item, positions, normals, corners, material }))
     }
 
-    /// The triangles, their sets and the count of dropped ones. Materials and sets that no triangle uses are removed.
+    /// The triangles, their sets and the count of dropped ones. Materials that no triangle uses are removed.
+    ///
+    /// # Errors
+    /// If matter of different indices of refraction is in one set.
     pub fn finish(
         mut self,
+        file: &Path,
         materials: &mut Vec<Material>,
         warnings: &mut Vec<String>,
-    ) -> (Vec<Triangle>, Vec<Set>, u64) {
-        let mut material_used = vec![false; materials.len()];
-        let mut set_used = vec![false; self.sets.len()];
+    ) -> Result<(Vec<Triangle>, Vec<Set>, u64)> {
+        let mut used = vec![false; materials.len()];
         for triangle in &self.triangles {
-            material_used[triangle.material as usize] = true;
-            set_used[triangle.set as usize] = true;
+            used[triangle.material as usize] = true;
         }
-        let material_number = renumber(materials, &material_used);
-        let set_number = renumber(&mut self.sets, &set_used);
+        for group in &mut self.groups {
+            group.set = group.set.take().or_else(|| materials[group.material].set.clone());
+        }
+        let numbers = renumber(materials, &used);
         for triangle in &mut self.triangles {
-            triangle.material = material_number[triangle.material as usize];
-            triangle.set = set_number[triangle.set as usize];
+            triangle.material = numbers[triangle.material as usize];
         }
-        for set in &mut self.sets {
-            set.material = material_number[set.material] as usize;
-            set.name = format!("{}, {}", set.name, materials[set.material].name);
+        for group in &mut self.groups {
+            group.material = numbers[group.material] as usize;
         }
+        let sets = sets::resolve(file, &mut self.triangles, &self.positions, &self.groups, materials, warnings)?;
         if self.dropped > 0 {
             warnings.push(format!("triangles of zero area were dropped: {}", self.dropped));
         }
-        if self.opposed > 0 {
-            let inside_out = 2 * self.opposed > self.triangles.len() as u64;
+        let count = self.triangles.iter().filter(|triangle| triangle.opposed && !triangle.turned).count();
+        if count > 0 {
+            let inside_out = 2 * count > self.triangles.len();
             let guess = if inside_out { "; the file may be inside out" } else { "" };
-            let count = self.opposed;
             warnings
                 .push(format!("triangles whose normals point against their winding, and were turned: {count}{guess}"));
         }
@@ -265,7 +302,7 @@ impl<'r, 'a> Meshes<'r, 'a> {
                 self.below
             ));
         }
-        (self.triangles, self.sets, self.dropped)
+        Ok((self.triangles, sets, self.dropped))
     }
 }
 

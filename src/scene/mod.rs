@@ -12,6 +12,7 @@ mod material;
 mod medium;
 mod mesh;
 mod presets;
+mod sets;
 mod unit;
 
 pub use presets::{Preset, preset, presets};
@@ -158,12 +159,21 @@ pub struct Frame {
     pub scale: f64,
 }
 
-/// One material on one instance of a mesh: the surfaces that exchange light through the matter they bound.
+/// The surfaces that exchange light through the matter they bound: what a file names as one (`extras.bssrdf.set`), or one
+/// material on one node and on other nodes where their borders meet it.
+///
+/// An open edge is a surface's border: the surface is rendered as that of matter which goes on behind it. At an edge of
+/// three or more, as inside of doubled or self-intersecting surfaces, each triangle is lit as it is wound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Set {
-    /// Node and material, for messages.
+    /// The name in the file, or node and material, for messages.
     pub name: String,
-    pub material: usize,
+    /// Indices of the materials, ascending.
+    pub materials: Vec<usize>,
+    /// Edges of one triangle, if translucent.
+    pub open_edges: u64,
+    /// Edges of three triangles or more, if translucent.
+    pub crowded_edges: u64,
 }
 
 /// A material as authored, lengths in metres.
@@ -182,6 +192,8 @@ pub struct Material {
     pub ior: f64,
     /// What fills it; none for an opaque material.
     pub medium: Option<Medium>,
+    /// The set that its surfaces join, wherever they are.
+    pub set: Option<String>,
 }
 
 /// A scattering medium, per channel.

@@ -9,3 +9,7 @@ mod mutations;
 mod nodes;
 mod presets;
 mod rules;
+#[allow(dead_code)]
+#[path = "../images/scenes.rs"]
+mod scenes;
+mod sets;
