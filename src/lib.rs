@@ -62,9 +62,13 @@
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
+//! The extremes that renders survive, each with its test, are in [`extremes`].
+//!
 //! The program uses this public interface alone. There is no global state: devices and renderers stand side by side.
 
 pub mod error;
+#[doc = include_str!("docs/extremes.md")]
+pub mod extremes {}
 pub mod gpu;
 pub mod image;
 pub mod inspect;

@@ -27,6 +27,8 @@ pub struct DeviceOptions {
     pub validation: bool,
     /// Uploads and downloads through staging buffers even where memory is shared, so that this path can be tested.
     pub staging: bool,
+    /// Most bytes of one buffer, where that is less than what the device binds.
+    pub buffer_bytes: Option<u64>,
 }
 
 /// A handle of an open device; clones share it. What is made from a device keeps it alive.
@@ -74,7 +76,7 @@ impl Device {
         let instance = Instance::new(options.validation)?;
         let candidates = instance.candidates()?;
         let chosen = choose(&candidates, options.device.as_deref())?;
-        let handles = Handles::create(instance, chosen, options.staging)?;
+        let handles = Handles::create(instance, chosen, options)?;
         Ok(Device { handles: Arc::new(handles), staging: Arc::default() })
     }
 
@@ -114,7 +116,7 @@ impl Device {
 }
 
 impl Handles {
-    fn create(instance: Instance, chosen: &Candidate, force_staging: bool) -> Result<Handles> {
+    fn create(instance: Instance, chosen: &Candidate, options: &DeviceOptions) -> Result<Handles> {
         let physical = chosen.physical;
         let priorities = [1.0];
         let queues =
@@ -146,7 +148,8 @@ impl Handles {
         let limits = properties.properties.limits;
         let max_buffer_bytes = u64::from(limits.max_storage_buffer_range)
             .min(maintenance3.max_memory_allocation_size)
-            .min(maintenance4.max_buffer_size);
+            .min(maintenance4.max_buffer_size)
+            .min(options.buffer_bytes.unwrap_or(u64::MAX));
         let mut handles = Handles {
             queue: Mutex::new(queue),
             family: chosen.family,
@@ -154,7 +157,7 @@ impl Handles {
             info: chosen.info.clone(),
             limits,
             timestamp_bits: families[chosen.family as usize].timestamp_valid_bits,
-            force_staging,
+            force_staging: options.staging,
             max_buffer_bytes,
             heap_bytes: buffer_heap(&device, &heaps),
             allocator: Mutex::new(None),

@@ -114,10 +114,12 @@ impl Renderer {
         for (slot, data) in scene_data(scene, &prepared) {
             let limit = device.max_storage_buffer_range();
             if data.len() as u64 > limit {
-                return Err(Error::Memory {
-                    step: format!("create buffer {}", slot.name()),
-                    problem: format!("it takes {} bytes, and the device binds {limit} at most", data.len()),
-                });
+                let (count, most) = (data.len() / slot.stride(), limit / slot.stride() as u64);
+                let problem = format!(
+                    "{count} of them take {} bytes; the device binds {limit} bytes at most, which {most} fit in",
+                    data.len()
+                );
+                return Err(Error::Memory { step: format!("create buffer {}", slot.name()), problem });
             }
             let buffer = Buffer::new(device, slot.name(), data.len() as u64, Location::Device)?;
             upload(device, &buffer, data)?;
