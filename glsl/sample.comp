@@ -26,7 +26,7 @@ void main() {
     if (surface.triangle == MISS) return;
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
-    if ((m.flags & TRANSLUCENT) == 0 || m.component_cdf[5] == 0.0) return;
+    if ((m.flags & TRANSLUCENT) == 0 || m.component_cdf[8] == 0.0) return;
 
     View view = views[0];
     Seen s = seen(view, surface, triangles[surface.triangle], shading);

@@ -30,6 +30,16 @@ const uint PROJECTION_MIS = 0u;
 const uint PROJECTION_CAMERA = 1u;
 // Projection: the normal axis alone, all hits.
 const uint PROJECTION_NORMAL = 2u;
+// Model: the standard dipole of Jensen et al. 2001.
+const uint MODEL_STANDARD = 0u;
+// Model: the better dipole of d'Eon 2012.
+const uint MODEL_BETTER = 1u;
+// Model: the directional dipole of Frisvad et al. 2014, which also depends on where light comes from.
+const uint MODEL_DIRECTIONAL = 2u;
+// Model: normalised diffusion of Christensen and Burley 2015.
+const uint MODEL_BURLEY = 3u;
+// Model: profiles tabulated by simulation.
+const uint MODEL_TABLE = 4u;
 // No environment.
 const uint ENVIRONMENT_NONE = 0u;
 // The same radiance from everywhere.
@@ -38,6 +48,8 @@ const uint ENVIRONMENT_CONSTANT = 1u;
 const uint ENVIRONMENT_IMAGE = 2u;
 // Material flag: light enters and leaves through this surface (a BSSRDF).
 const uint TRANSLUCENT = 1u;
+// Material flag: the directional dipole is averaged with itself, light and eye exchanged.
+const uint RECIPROCAL = 256u;
 // Light kind: position and intensity [W/sr].
 const uint LIGHT_POINT = 0u;
 // Light kind: a point light with a cone.
@@ -101,6 +113,8 @@ layout(constant_id = 3) const uint BATCHED = 0;
 layout(constant_id = 4) const uint COUNT_STEPS = 0;
 // Bit k is set where a material has a texture of kind k (TEXTURE_*).
 layout(constant_id = 7) const uint TEXTURED = 0;
+// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
+layout(constant_id = 5) const uint MODELS = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -193,23 +207,39 @@ struct Shading {
     uint material;
 };
 
-// A material as kernels read it. Standard dipole of Jensen et al. 2001 with two sources per channel.
+// A material as kernels read it. A model's profile is strength x shape(r); its file in `reference::profile` says
+// which of the numbers it uses. Directional dipole: shape and strength of the standard dipole choose hits and radii.
 struct Material {
-    // Effective transport coefficient of each channel, sigma_tr [1/length].
+    // Rate of each channel's exponential [1/length]: sigma_tr of the dipoles, 1/d of normalised diffusion.
     vec3 sigma_tr;
-    // Depth of the real source z_r of each channel.
+    // Dipoles: depth of the real source z_r of each channel.
     vec3 z_real;
-    // Height of the virtual source z_v of each channel (positive).
+    // Dipoles: height of the virtual source z_v of each channel (positive).
     vec3 z_virtual;
-    // Radiance per unit shape(r) and unit flux that entered: alpha'/2 / (pi (1 - rho_e)); /pi alone for jensen2001.
+    // Better dipole: the fluence's part over the flux's, C_phi / (C_E D) [1/length].
+    vec3 fluence;
+    // Directional dipole: 2 A d_e, the height of the virtual source over the modified tangent plane.
+    vec3 height;
+    // Directional dipole: squared 1 / (3 sigma_t), with sigma_t not reduced [length^2].
+    vec3 free_path2;
+    // Directional dipole: constant before its braces, 1 / (4 pi^2) over what leaves; and its renormalisation.
+    vec3 beam;
+    // Directional dipole: C_phi.
+    float c_phi;
+    // Directional dipole: C_E.
+    float c_e;
+    // Radiance per unit shape(r) and unit flux that entered: for dipoles alpha'/2 / (pi (1 - rho_e)); /pi alone for
+    // jensen2001.
     vec3 strength;
     // Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
     vec3 density;
-    // Cumulative probability of the six components, in the order R real, R virtual, G real, ... .
-    float component_cdf[6];
+    // Cumulative probability of the sampler's nine components, three of each channel; see `reference::profile`.
+    float component_cdf[9];
+    // One of MODEL_*.
+    uint model;
     // Radius of the ball in which probes look for surfaces.
     float radius_max;
-    // Rate of the camera projection's exponential: the smallest sigma_tr [1/length].
+    // Rate of the camera projection's exponential: the smallest at which a channel's profile falls [1/length].
     float camera_rate;
     // Index of refraction, inside over outside.
     float ior;
@@ -220,7 +250,7 @@ struct Material {
     float metallic;
     // Emitted radiance.
     vec3 emission;
-    // TRANSLUCENT or nothing.
+    // TRANSLUCENT, RECIPROCAL or nothing.
     uint flags;
     // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
     uint ramp;

@@ -3,10 +3,11 @@
 
 use crate::{
     error::Result,
-    reference::profile::Dipole,
+    model,
+    reference::profile::{self, Coefficients, Profile},
     render::{Limits, Plan, value_name},
     scene::{EnvironmentMap, Lens, LightKind, Material, Medium, Scene},
-    settings::Settings,
+    settings::{Model, Settings},
     shared::Slot,
 };
 use glam::DVec3;
@@ -41,7 +42,7 @@ pub struct MatterReport {
     /// Where the numbers came from.
     pub source: String,
     /// The model of the profile, and why it.
-    pub model: &'static str,
+    pub model: Model,
     pub why: String,
     /// [1/mm].
     pub sigma_s_prime: DVec3,
@@ -59,14 +60,18 @@ pub struct MatterReport {
 }
 
 impl MatterReport {
-    fn new(medium: &Medium, ior: f64) -> MatterReport {
+    fn new(medium: &Medium, ior: f64, settings: &Settings) -> MatterReport {
         let (sigma_s_prime, sigma_a) = (medium.sigma_s_prime * 1e-3, medium.sigma_a * 1e-3);
         let extinction = sigma_s_prime + sigma_a;
-        let channels = [0, 1, 2].map(|c| Dipole::new(sigma_s_prime[c], sigma_a[c], ior));
+        let choice = model::resolve(settings, medium);
+        let total = |c: usize| {
+            let constant = profile::constant(choice.model)?;
+            Some(Profile::new(constant, &Coefficients::of(medium, ior, c)).total())
+        };
         MatterReport {
             source: medium.source.clone(),
-            model: "standard",
-            why: "the only model".into(),
+            model: choice.model,
+            why: choice.why,
             sigma_s_prime,
             sigma_a,
             g: medium.g,
@@ -75,7 +80,7 @@ impl MatterReport {
             ),
             mean_free_path: 1.0 / extinction,
             diffuse_mean_free_path: 1.0 / (3.0 * sigma_a * extinction).map(f64::sqrt),
-            total_reflectance: DVec3::from(channels.map(|channel| channel.total())),
+            total_reflectance: DVec3::from([0, 1, 2].map(|c| total(c).unwrap_or(f64::NAN))),
         }
     }
 }
@@ -91,7 +96,7 @@ impl<'a> Inspection<'a> {
             name: material.name.clone(),
             triangles: scene.shadings.iter().filter(|shading| shading.material as usize == index).count(),
             ior: material.ior,
-            matter: material.medium.as_ref().map(|medium| MatterReport::new(medium, material.ior)),
+            matter: material.medium.as_ref().map(|medium| MatterReport::new(medium, material.ior, settings)),
         };
         let materials = scene.materials.iter().enumerate().map(report).collect();
         Ok(Inspection { scene, plan, materials, warnings: scene.warnings.clone() })
@@ -165,7 +170,7 @@ fn material(report: &MaterialReport) -> Value {
     value["matter"] = report.matter.as_ref().map_or(Value::Null, |matter| {
         json!({
             "source": matter.source,
-            "model": matter.model,
+            "model": matter.model.to_string(),
             "why": matter.why,
             "sigmaSPrimePerMm": matter.sigma_s_prime.to_array(),
             "sigmaAPerMm": matter.sigma_a.to_array(),

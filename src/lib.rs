@@ -57,7 +57,8 @@
 //! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
-//! | [`prepare`] | `scene`, `settings`, `shared`, `reference` | [`Scene`] and [`Settings`] to what kernels read |
+//! | [`model`] | `scene`, `settings` | which profile a material gets |
+//! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
@@ -72,6 +73,7 @@ pub mod extremes {}
 pub mod gpu;
 pub mod image;
 pub mod inspect;
+pub mod model;
 pub mod prepare;
 pub mod reference;
 pub mod render;
@@ -84,4 +86,4 @@ pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use image::Image;
 pub use render::{Progress, Renderer};
 pub use scene::{Environment, LoadOptions, Scene};
-pub use settings::{CameraChoice, Normalisation, Projection, Settings};
+pub use settings::{CameraChoice, Model, Normalisation, Projection, Settings};

@@ -2,10 +2,14 @@
 
 use crate::{
     error::{Error, Result},
-    reference::{Inputs, light, profile},
-    scene::{Camera, EnvironmentMap, Frame, Lens, LightKind, Scene},
+    model,
+    reference::{
+        Inputs, light,
+        profile::{self, Coefficients},
+    },
+    scene::{Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene},
     settings::{Projection, Settings},
-    shared::{self, Features, Light, Material, Texture, View},
+    shared::{self, Features, Light, Material, TRANSLUCENT, Texture, View},
 };
 use glam::{DVec3, Vec3};
 
@@ -49,6 +53,7 @@ impl Prepared {
             texels: &self.texels,
             textures: &self.textures,
             coordinates: &scene.coordinates,
+            profiles: &[],
         }
     }
 }
@@ -142,6 +147,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_some() == flag);
     let emits = scene.materials.iter().any(|m| m.emission != DVec3::ZERO);
     let rough = scene.materials.iter().any(|m| m.roughness > 0.0);
+    let translucent = materials.iter().filter(|material| material.flags & TRANSLUCENT != 0);
+    let models = translucent.fold(0, |mask, material| mask | 1 << material.model);
     Ok(Prepared {
         features: Features {
             projection: settings.projection as u32,
@@ -149,6 +156,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
             batches: u32::from(settings.variance),
             counters: 0,
             textures: 0,
+            models,
         },
         view,
         materials,
@@ -222,23 +230,25 @@ fn delta_light(light: &crate::scene::Light, frame: Frame) -> Light {
     out
 }
 
+/// Channel `c` of a medium in internal units, of which a metre has `scale`, with a mean free path that kernels resolve.
+fn coefficients(medium: &Medium, ior: f64, scale: f64, c: usize) -> Coefficients {
+    let authored = Coefficients::of(medium, ior, c).in_units(scale);
+    let extinction = authored.sigma_s_prime + authored.sigma_a;
+    let kept = extinction.clamp(1.0 / MEAN_FREE_PATH.1, 1.0 / MEAN_FREE_PATH.0);
+    if extinction > 0.0 { authored.in_units(extinction / kept) } else { authored }
+}
+
 fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings) -> Result<Material> {
     let mut out = match &material.medium {
         None => Material::default(),
         Some(medium) => {
-            // Coefficients per internal unit.
-            let (mut sigma_s_prime, mut sigma_a) = (medium.sigma_s_prime / frame.scale, medium.sigma_a / frame.scale);
-            let extinction = sigma_s_prime + sigma_a;
-            for channel in 0..3 {
-                if extinction[channel] > 0.0 {
-                    let kept = extinction[channel].clamp(1.0 / MEAN_FREE_PATH.1, 1.0 / MEAN_FREE_PATH.0);
-                    sigma_s_prime[channel] *= kept / extinction[channel];
-                    sigma_a[channel] *= kept / extinction[channel];
-                }
-            }
-            let normalisation = settings.normalisation;
-            let out = profile::material(sigma_s_prime, sigma_a, material.ior, normalisation, settings.radius_tail);
-            if settings.projection == Projection::Camera && out.component_cdf[5] > 0.0 && out.camera_rate <= 0.0 {
+            let model = model::resolve(settings, medium).model;
+            let constant = profile::constant(model)
+                .ok_or_else(|| Error::setting("model", format!("the {model} model is not built yet")))?;
+            let coefficients = [0, 1, 2].map(|c| coefficients(medium, material.ior, frame.scale, c));
+            let options = profile::Options { normalisation: settings.normalisation, radius_tail: settings.radius_tail };
+            let out = profile::material(constant, &coefficients, options);
+            if settings.projection == Projection::Camera && out.component_cdf[8] > 0.0 && out.camera_rate <= 0.0 {
                 let problem = format!(
                     "camera needs sigma_tr > 0 in every channel, but material \"{}\" ({}) absorbs nothing in one; use mis or normal",
                     material.name, medium.source

@@ -1,6 +1,7 @@
 //! What a caller may choose about a render.
 
 use crate::shared;
+use std::{fmt, str::FromStr};
 
 /// How a sampled point of the tangent plane is carried to the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -23,6 +24,55 @@ pub enum Normalisation {
     Energy,
     /// 1 / pi, as in Jensen et al. 2001: darker by exactly 1 - rho_e.
     Jensen2001,
+}
+
+/// How light spreads in translucent matter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Model {
+    /// What the material's file names, else what is recommended for its matter.
+    #[default]
+    Auto,
+    /// Standard dipole: H. W. Jensen et al., SIGGRAPH 2001.
+    Standard,
+    /// Better dipole: E. d'Eon 2012.
+    Better,
+    /// Directional dipole: J. R. Frisvad, T. Hachisuka, T. K. Kjeldsen, ACM TOG 34 (2014). Can give out more light than
+    /// it takes in.
+    Directional,
+    /// Normalised diffusion: P. Christensen, B. Burley 2015.
+    Burley,
+    /// Profiles tabulated by simulation.
+    Table,
+}
+
+impl Model {
+    /// Every model, with its name in files and on the command line.
+    pub const NAMES: [(Model, &str); 6] = [
+        (Model::Auto, "auto"),
+        (Model::Standard, "standard"),
+        (Model::Better, "better"),
+        (Model::Directional, "directional"),
+        (Model::Burley, "burley"),
+        (Model::Table, "table"),
+    ];
+}
+
+impl fmt::Display for Model {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (_, name) = Model::NAMES.iter().find(|(model, _)| model == self).expect("every model has a name");
+        out.pad(name)
+    }
+}
+
+impl FromStr for Model {
+    type Err = String;
+
+    /// The model of that name; the error lists those there are.
+    fn from_str(text: &str) -> Result<Model, String> {
+        let found = Model::NAMES.iter().find(|(_, name)| *name == text);
+        let names = Model::NAMES.map(|(_, name)| name).join(", ");
+        found.map(|(model, _)| *model).ok_or_else(|| format!("unknown model \"{text}\"; known: {names}"))
+    }
 }
 
 /// Which camera of the scene looks.
@@ -49,6 +99,8 @@ pub struct Settings {
     pub directions: u32,
     pub projection: Projection,
     pub normalisation: Normalisation,
+    /// Profile of every translucent material; `Auto` leaves it to each.
+    pub model: Model,
     /// Key of all random numbers.
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
@@ -75,6 +127,7 @@ impl Default for Settings {
             directions: 1,
             projection: Projection::Mis,
             normalisation: Normalisation::Energy,
+            model: Model::Auto,
             seed: 0,
             show_environment: false,
             variance: true,

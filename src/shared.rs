@@ -196,6 +196,17 @@ constants! {
     /// Projection: the normal axis alone, all hits.
     PROJECTION_NORMAL: u32 = 2;
 
+    /// Model: the standard dipole of Jensen et al. 2001.
+    MODEL_STANDARD: u32 = 0;
+    /// Model: the better dipole of d'Eon 2012.
+    MODEL_BETTER: u32 = 1;
+    /// Model: the directional dipole of Frisvad et al. 2014, which also depends on where light comes from.
+    MODEL_DIRECTIONAL: u32 = 2;
+    /// Model: normalised diffusion of Christensen and Burley 2015.
+    MODEL_BURLEY: u32 = 3;
+    /// Model: profiles tabulated by simulation.
+    MODEL_TABLE: u32 = 4;
+
     /// No environment.
     ENVIRONMENT_NONE: u32 = 0;
     /// The same radiance from everywhere.
@@ -205,6 +216,8 @@ constants! {
 
     /// Material flag: light enters and leaves through this surface (a BSSRDF).
     TRANSLUCENT: u32 = 1;
+    /// Material flag: the directional dipole is averaged with itself, light and eye exchanged.
+    RECIPROCAL: u32 = 256;
 
     /// Light kind: position and intensity [W/sr].
     LIGHT_POINT: u32 = 0;
@@ -354,23 +367,39 @@ structs! {
         material: u32,
     }
 
-    /// A material as kernels read it. Standard dipole of Jensen et al. 2001 with two sources per channel.
+    /// A material as kernels read it. A model's profile is strength x shape(r); its file in `reference::profile` says
+    /// which of the numbers it uses. Directional dipole: shape and strength of the standard dipole choose hits and radii.
     struct Material {
-        /// Effective transport coefficient of each channel, sigma_tr [1/length].
+        /// Rate of each channel's exponential [1/length]: sigma_tr of the dipoles, 1/d of normalised diffusion.
         sigma_tr: Vec3,
-        /// Depth of the real source z_r of each channel.
+        /// Dipoles: depth of the real source z_r of each channel.
         z_real: Vec3,
-        /// Height of the virtual source z_v of each channel (positive).
+        /// Dipoles: height of the virtual source z_v of each channel (positive).
         z_virtual: Vec3,
-        /// Radiance per unit shape(r) and unit flux that entered: alpha'/2 / (pi (1 - rho_e)); /pi alone for jensen2001.
+        /// Better dipole: the fluence's part over the flux's, C_phi / (C_E D) [1/length].
+        fluence: Vec3,
+        /// Directional dipole: 2 A d_e, the height of the virtual source over the modified tangent plane.
+        height: Vec3,
+        /// Directional dipole: squared 1 / (3 sigma_t), with sigma_t not reduced [length^2].
+        free_path2: Vec3,
+        /// Directional dipole: constant before its braces, 1 / (4 pi^2) over what leaves; and its renormalisation.
+        beam: Vec3,
+        /// Directional dipole: C_phi.
+        c_phi: f32,
+        /// Directional dipole: C_E.
+        c_e: f32,
+        /// Radiance per unit shape(r) and unit flux that entered: for dipoles alpha'/2 / (pi (1 - rho_e)); /pi alone for
+        /// jensen2001.
         strength: Vec3,
         /// Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
         density: Vec3,
-        /// Cumulative probability of the six components, in the order R real, R virtual, G real, ... .
-        component_cdf: [f32; 6],
+        /// Cumulative probability of the sampler's nine components, three of each channel; see `reference::profile`.
+        component_cdf: [f32; 9],
+        /// One of MODEL_*.
+        model: u32,
         /// Radius of the ball in which probes look for surfaces.
         radius_max: f32,
-        /// Rate of the camera projection's exponential: the smallest sigma_tr [1/length].
+        /// Rate of the camera projection's exponential: the smallest at which a channel's profile falls [1/length].
         camera_rate: f32,
         /// Index of refraction, inside over outside.
         ior: f32,
@@ -381,7 +410,7 @@ structs! {
         metallic: f32,
         /// Emitted radiance.
         emission: Vec3,
-        /// TRANSLUCENT or nothing.
+        /// TRANSLUCENT, RECIPROCAL or nothing.
         flags: u32,
         /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
         ramp: u32,
@@ -546,6 +575,8 @@ features! {
     counters = 4: COUNT_STEPS,
     /// Bit k is set where a material has a texture of kind k (TEXTURE_*).
     textures = 7: TEXTURED,
+    /// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
+    models = 5: MODELS,
 }
 
 /// The text of `glsl/shared.glsl`.

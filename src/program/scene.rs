@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use translucent::{
-    CameraChoice, LoadOptions, Normalisation, Projection, Scene, Settings,
+    CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings,
     scene::{Environment, EnvironmentMap},
 };
 
@@ -30,9 +30,9 @@ pub struct SceneOptions {
     /// Whether all light that enters and is not absorbed leaves again, or the darker constant of Jensen et al. 2001.
     #[arg(long, default_value = "energy", value_parser = normalisations())]
     normalisation: Normalisation,
-    /// Profile of every material; auto is what the material says, which is the standard dipole.
-    #[arg(long, default_value = "auto", value_parser = ["auto", "standard"])]
-    model: String,
+    /// How light spreads in every translucent material; auto is what the material says, else the standard dipole.
+    #[arg(long, default_value = "auto", value_parser = models())]
+    model: Model,
     /// Light from infinitely far away: a latitude-longitude image or one radiance.
     #[arg(long, value_name = "FILE.hdr|.exr|constant:R,G,B", value_parser = arguments::environment)]
     environment: Option<EnvironmentSource>,
@@ -70,6 +70,11 @@ fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
         "jensen2001" => Normalisation::Jensen2001,
         _ => Normalisation::Energy,
     })
+}
+
+fn models() -> impl TypedValueParser<Value = Model> {
+    PossibleValuesParser::new(Model::NAMES.map(|(_, name)| name))
+        .map(|name| name.parse().expect("the parser passes names alone"))
 }
 
 impl SceneOptions {
@@ -115,6 +120,7 @@ impl SceneOptions {
             directions: self.directions,
             projection: self.projection,
             normalisation: self.normalisation,
+            model: self.model,
             show_environment: self.show_environment,
             ..Settings::default()
         }

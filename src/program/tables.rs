@@ -2,7 +2,11 @@
 
 use super::{Failure, print};
 use std::process::ExitCode;
-use translucent::{Device, reference::profile::Dipole, scene};
+use translucent::{
+    Device,
+    reference::profile::{Dipole, Radial},
+    scene,
+};
 
 /// Every named material: coefficients as its table has them, mean free path 1/sigma_t' and the total diffuse
 /// reflectance of a flat half space under the energy normalisation.

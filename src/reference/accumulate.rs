@@ -22,16 +22,15 @@ use super::boundary::transmittance;
 use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::pixel::position;
-use super::projection::{
-    Seen, geometric_normal, inverse_scale, material, mixture_density, seen, shading_normal, shapes,
-};
+use super::profile::{Matter, shapes, shapes_shifted};
+use super::projection::{Seen, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal};
 use super::random::{batch, key, scramble, sobol, unit};
 use super::sample::coordinate;
 use super::sums::Contribution;
 use super::{Inputs, intersect, texture};
 use crate::shared::{
-    BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, Material, PROJECTION_CAMERA, Probe,
-    SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
+    BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, PROJECTION_CAMERA, Probe, SHADOW_OFFSET, Step,
+    Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -66,11 +65,11 @@ pub fn accumulate(
         return Contribution::default();
     }
     let seen = seen(inputs, surface);
-    let material = material(inputs, surface);
-    let Some((chosen, factor)) = choose(inputs, step, index, material, &seen, probe, hits) else {
+    let matter = matter_at(inputs, surface);
+    let Some((chosen, factor)) = choose(inputs, step, index, matter, &seen, probe, hits) else {
         return Contribution::default();
     };
-    let ior = f64::from(material.ior);
+    let ior = f64::from(matter.material.ior);
     let point = surface.position.as_dvec3() + delta(probe, hits, chosen);
     let entry = Entry::new(inputs, ior, seen.side, point, hits.triangle[chosen]);
     let leaving = entry.tint
@@ -94,7 +93,7 @@ pub fn choose(
     inputs: &Inputs,
     step: &Step,
     index: u32,
-    material: &Material,
+    matter: Matter,
     seen: &Seen,
     probe: &Probe,
     hits: &Hits,
@@ -104,18 +103,21 @@ pub fn choose(
     let local = |j: usize| {
         let shape = &inputs.triangles[hits.triangle[j] as usize];
         let point = seen.position + delta(probe, hits, j);
-        texture::medium(inputs, material, hits.triangle[j], barycentric(shape, point))
+        texture::medium(inputs, matter.material, hits.triangle[j], barycentric(shape, point))
     };
     if inputs.features.projection == PROJECTION_CAMERA {
-        return Some((0, given_factor(&local(0), seen, probe, delta(probe, hits, 0), normal(0))));
+        let local = local(0);
+        let local = Matter { material: &local, ..matter };
+        return Some((0, given_factor(local, seen, probe, delta(probe, hits, 0), normal(0))));
     }
     let stored = hits.count.min(MAX_HITS) as usize;
     let terms: Vec<(DVec3, f64)> = (0..stored)
         .map(|j| {
             let delta = delta(probe, hits, j);
-            let p = mixture_density(inputs.features.projection, material, seen, delta, normal(j));
+            let p = mixture_density(inputs.features.projection, matter, seen, delta, normal(j));
             let local = local(j);
-            let f = local.strength.as_dvec3() * shapes(&local, delta.length());
+            let local = Matter { material: &local, ..matter };
+            let f = local.material.strength.as_dvec3() * shapes(local, delta.length());
             if p > 0.0 { (f / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
         })
         .collect();
@@ -133,21 +135,12 @@ pub fn choose(
 }
 
 /// f / p of the method as given.
-fn given_factor(material: &Material, seen: &Seen, probe: &Probe, delta: DVec3, normal: DVec3) -> DVec3 {
-    let rho = delta.length();
-    let (r, rate) = (f64::from(probe.radius), f64::from(material.camera_rate));
+fn given_factor(matter: Matter, seen: &Seen, probe: &Probe, delta: DVec3, normal: DVec3) -> DVec3 {
+    let (r, rate) = (f64::from(probe.radius), f64::from(matter.material.camera_rate));
     let d = probe.direction.as_dvec3();
     let jacobian = seen.normal.dot(d).abs() / normal.dot(d).abs() * inverse_scale(seen, delta).powi(2);
-    let channel = |c: usize| {
-        let sigma = f64::from(material.sigma_tr[c]);
-        let source = |z: f64| {
-            let d = rho.hypot(z);
-            z * (1.0 + sigma * d) / (d * d * d) * (rate * r - sigma * d).exp()
-        };
-        (source(material.z_real[c].into()) + source(material.z_virtual[c].into())) / TAU
-    };
-    let profile = DVec3::from([0, 1, 2].map(channel));
-    material.strength.as_dvec3() * profile * (TAU * r / rate * jacobian)
+    let profile = shapes_shifted(matter, delta.length(), rate * r);
+    matter.material.strength.as_dvec3() * profile * (TAU * r / rate * jacobian)
 }
 
 /// A point where light enters.

@@ -49,6 +49,8 @@ pub struct Inputs<'a> {
     pub texels: &'a [u32],
     pub textures: &'a [Texture],
     pub coordinates: &'a [Coordinates],
+    /// Tabulated profiles of the materials.
+    pub profiles: &'a [f32],
 }
 
 impl Inputs<'_> {

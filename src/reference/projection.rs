@@ -14,7 +14,7 @@
 //!
 //!   zero behind the eye (1/q <= 0). 1/l = 0 is an orthographic camera.
 //!
-//! p_T(r) = sum of b_c shape_c(r) / mass_c over the channels; see [`profile`](super::profile).
+//! p_T(r) = sum of b_c shape_c(r) / mass_c over the channels: [`plane_density`].
 //!
 //! # Combination
 //! The normal axis, two tangent axes and the camera are chosen with the fractions a_k, and every point found is divided
@@ -25,7 +25,7 @@
 
 use super::Inputs;
 use super::math::basis;
-use super::profile::Dipole;
+use super::profile::{Matter, plane_density};
 use super::texture;
 use crate::shared::{Material, PROJECTION_CAMERA, PROJECTION_NORMAL, Surface, Triangle};
 use glam::DVec3;
@@ -109,6 +109,11 @@ pub fn material<'a>(inputs: &Inputs<'a>, surface: &Surface) -> &'a Material {
     &inputs.materials[inputs.shadings[surface.triangle as usize].material as usize]
 }
 
+/// The same, with what its profile reads.
+pub fn matter_at<'a>(inputs: &Inputs<'a>, surface: &Surface) -> Matter<'a> {
+    Matter { material: material(inputs, surface), tables: inputs.profiles }
+}
+
 /// Fractions of the techniques at a point seen with cosine `cos`.
 pub fn fractions(projection: u32, cos: f64) -> [f64; 4] {
     match projection {
@@ -123,37 +128,17 @@ pub fn fractions(projection: u32, cos: f64) -> [f64; 4] {
     }
 }
 
-/// The dipole of channel `c` of a material; only its shape is known there, so the albedo is 1.
-pub fn dipole(material: &Material, c: usize) -> Dipole {
-    Dipole {
-        albedo: 1.0,
-        sigma_tr: f64::from(material.sigma_tr[c]),
-        z_real: f64::from(material.z_real[c]),
-        z_virtual: f64::from(material.z_virtual[c]),
-    }
-}
-
-/// shape(r) of the three channels.
-pub fn shapes(material: &Material, r: f64) -> DVec3 {
-    DVec3::from([0, 1, 2].map(|c| dipole(material, c).shape(r)))
-}
-
-/// p_T(r): density of the points in a technique's plane.
-pub fn plane_density(material: &Material, r: f64) -> f64 {
-    material.density.as_dvec3().dot(shapes(material, r))
-}
-
 /// 1/q, the camera's rescaling between plane and surface; not positive behind the eye.
 pub fn inverse_scale(seen: &Seen, delta: DVec3) -> f64 {
     1.0 - delta.dot(seen.normal) * seen.inverse_distance / seen.wo.dot(seen.normal)
 }
 
 /// Density per area at xo + `delta` of one technique, where the surface's normal is `normal`.
-pub fn density(technique: usize, material: &Material, seen: &Seen, delta: DVec3, normal: DVec3) -> f64 {
+pub fn density(technique: usize, matter: Matter, seen: &Seen, delta: DVec3, normal: DVec3) -> f64 {
     if technique != CAMERA {
         let axis = seen.axes[technique];
         let r = (delta - delta.dot(axis) * axis).length();
-        return plane_density(material, r) * normal.dot(axis).abs();
+        return plane_density(matter, r) * normal.dot(axis).abs();
     }
     let k = inverse_scale(seen, delta);
     if k <= 0.0 {
@@ -162,12 +147,12 @@ pub fn density(technique: usize, material: &Material, seen: &Seen, delta: DVec3,
     let q = 1.0 / k;
     let r = q * (delta - seen.wo * (delta.dot(seen.normal) / seen.wo.dot(seen.normal))).length();
     let d = (delta * seen.inverse_distance - seen.wo).normalize();
-    plane_density(material, r) * normal.dot(d).abs() / seen.normal.dot(d).abs() * q * q
+    plane_density(matter, r) * normal.dot(d).abs() / seen.normal.dot(d).abs() * q * q
 }
 
 /// Density per area at xo + `delta` of all techniques together.
-pub fn mixture_density(projection: u32, material: &Material, seen: &Seen, delta: DVec3, normal: DVec3) -> f64 {
+pub fn mixture_density(projection: u32, matter: Matter, seen: &Seen, delta: DVec3, normal: DVec3) -> f64 {
     let fractions = fractions(projection, seen.normal.dot(seen.wo));
-    let part = |(k, a): (usize, f64)| if a > 0.0 { a * density(k, material, seen, delta, normal) } else { 0.0 };
+    let part = |(k, a): (usize, f64)| if a > 0.0 { a * density(k, matter, seen, delta, normal) } else { 0.0 };
     fractions.into_iter().enumerate().map(part).sum()
 }

@@ -1,14 +1,15 @@
 //! Draws the probe ray of a sample: radius, angle, channel and technique. Twin of `sample.comp`.
 //!
-//! `mis` and `normal` draw the radius from the profile itself ([`Dipole::radius`](super::profile::Dipole::radius)), so
+//! `mis` and `normal` draw the radius from the profile itself ([`draw_radius`]), so
 //! that on a plane every sample has the same weight, and look for surfaces in the ball of radius `radius_max`: the same
 //! region for every technique, as the balance heuristic requires. `camera` draws it from
 //! sigma e^(-sigma r) / (2 pi r) with the one rate `camera_rate`, and follows the camera ray from the eye.
 
+use super::Inputs;
 use super::pixel::position;
-use super::projection::{CAMERA, dipole, fractions, material, seen};
+use super::profile::{self, draw_radius};
+use super::projection::{CAMERA, fractions, matter_at, seen};
 use super::random::{batch, key, scramble, unit};
-use super::{Inputs, profile};
 use crate::shared::{
     DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, PROJECTION_CAMERA, Probe, Step, Surface, TRANSLUCENT,
 };
@@ -33,8 +34,9 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
     if surface.triangle == MISS {
         return NONE;
     }
-    let material = material(inputs, surface);
-    if material.flags & TRANSLUCENT == 0 || material.component_cdf[5] == 0.0 {
+    let matter = matter_at(inputs, surface);
+    let material = matter.material;
+    if material.flags & TRANSLUCENT == 0 || material.component_cdf[8] == 0.0 {
         return NONE;
     }
     let seen = seen(inputs, surface);
@@ -47,12 +49,7 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
     let r = if given {
         -(-u(DIM_RADIUS)).ln_1p() / f64::from(material.camera_rate)
     } else {
-        let cdf = material.component_cdf;
-        let pick = u(DIM_COMPONENT);
-        let component = cdf.iter().position(|&c| pick < f64::from(c)).unwrap_or(cdf.len() - 1);
-        let dipole = dipole(material, component / 2);
-        let z = if component % 2 == 0 { dipole.z_real } else { dipole.z_virtual };
-        dipole.radius(u(DIM_RADIUS), z)
+        draw_radius(matter, u(DIM_COMPONENT), u(DIM_RADIUS))
     };
 
     let [n, tangent, bitangent] = seen.axes;

@@ -177,7 +177,7 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         "directions": settings.directions,
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
-        "model": "standard",
+        "model": settings.model.to_string(),
         "radiusTail": settings.radius_tail,
         "showEnvironment": settings.show_environment,
     });

@@ -2,11 +2,11 @@
 
 use super::frame::INTENSITY_MAX;
 use super::json::Item;
-use super::medium::{self, Length, Mapping};
+use super::medium::{self, Mapping};
 use super::presets::{Preset, preset};
 use super::unit::metres;
-use super::{Material, Medium};
-use crate::{Error, Result};
+use super::{Appearance, LengthKind, Material, Medium};
+use crate::{Error, Result, settings::Model};
 use glam::DVec3;
 use std::path::Path;
 
@@ -39,9 +39,6 @@ const BSSRDF_KEYS: &[&str] = &[
     "surface",
     "set",
 ];
-
-/// Models that a material may name.
-const MODELS: &[&str] = &["auto", "standard", "better", "directional", "burley", "table"];
 
 /// Extensions of materials whose effect is left out.
 pub(super) const UNMODELLED: &[(&str, &str)] = &[
@@ -102,7 +99,7 @@ pub(super) fn read(
         material.medium = Some(medium_of(&found));
         material.ior = found.ior;
     } else if let Some(bssrdf) = bssrdf {
-        read_bssrdf(&bssrdf, authored_ior, &mut material, warnings)?;
+        read_bssrdf(&bssrdf, authored_ior, &mut material)?;
     } else if let Some(scatter) = scatter {
         material.medium = read_scattering(item, &scatter, Mapping::Scatter, warnings)?;
     } else if let Some(scatter) = volume_scatter {
@@ -211,17 +208,14 @@ fn medium_of(preset: &Preset) -> Medium {
         sigma_s_prime: preset.sigma_s_prime * 1e3,
         sigma_a: preset.sigma_a * 1e3,
         g: preset.g,
+        appearance: None,
+        model: None,
         source: format!("preset {}", preset.name),
     }
 }
 
 /// `extras.bssrdf`: a preset, or coefficients, or an albedo with a length.
-fn read_bssrdf(
-    item: &Item,
-    authored_ior: Option<f64>,
-    material: &mut Material,
-    warnings: &mut Vec<String>,
-) -> Result<()> {
+fn read_bssrdf(item: &Item, authored_ior: Option<f64>, material: &mut Material) -> Result<()> {
     for key in item.keys()? {
         if !BSSRDF_KEYS.contains(&key) {
             let key = super::json::shorten(key);
@@ -251,26 +245,30 @@ fn read_bssrdf(
     } else {
         material.ior = own_ior.or(authored_ior).unwrap_or(DEFAULT_IOR);
         let g = g.unwrap_or(DVec3::ZERO);
+        let mut appearance = None;
         let (sigma_s_prime, sigma_a) = if let Some(albedo) = item.get("albedo")? {
             refuse(&["sigma_s_prime", "sigma_s", "sigma_a"], "albedo")?;
-            read_albedo(item, &albedo, material.ior)?
+            let read = read_albedo(item, &albedo)?;
+            appearance = Some(read);
+            medium::channels(|c| {
+                medium::from_albedo(read.albedo[c], read.length[c], read.kind, material.ior)
+                    .map_err(|problem| albedo.error(problem))
+            })?
         } else if item.get("sigma_a")?.is_some() {
             refuse(&["mean_free_path", "diffuse_mean_free_path"], "sigma_a")?;
             read_coefficients(item, g)?
         } else {
             return Err(item.error("needs `preset`, or `sigma_a` with `sigma_s_prime`, or `albedo` with a length"));
         };
-        material.medium = Some(Medium { sigma_s_prime, sigma_a, g, source: "extras.bssrdf".into() });
+        material.medium =
+            Some(Medium { sigma_s_prime, sigma_a, g, appearance, model: None, source: "extras.bssrdf".into() });
     }
 
     if let Some(model) = item.get("model")? {
-        let name = model.string()?;
-        if !MODELS.contains(&name) {
-            let name = super::json::shorten(name);
-            return Err(model.error(format!("unknown model \"{name}\"; known: {}", MODELS.join(", "))));
-        }
-        if !matches!(name, "auto" | "standard") {
-            warnings.push(model.note(format!("the {name} model is not built yet; the standard dipole is used")));
+        let chosen: Model =
+            super::json::shorten(model.string()?).parse().map_err(|problem: String| model.error(problem))?;
+        if let Some(medium) = &mut material.medium {
+            medium.model = Some(chosen);
         }
     }
     if let Some(surface) = item.get("surface")? {
@@ -345,11 +343,11 @@ fn read_coefficients(item: &Item, g: DVec3) -> Result<(DVec3, DVec3)> {
     Ok((sigma_s_prime * factor, sigma_a * factor))
 }
 
-fn read_albedo(item: &Item, albedo: &Item, ior: f64) -> Result<(DVec3, DVec3)> {
+fn read_albedo(item: &Item, albedo: &Item) -> Result<Appearance> {
     let factor = read_unit(item, false)?;
     let (length, kind) = match (item.get("mean_free_path")?, item.get("diffuse_mean_free_path")?) {
-        (Some(length), None) => (length, Length::MeanFreePath),
-        (None, Some(length)) => (length, Length::DiffuseMeanFreePath),
+        (Some(length), None) => (length, LengthKind::MeanFreePath),
+        (None, Some(length)) => (length, LengthKind::DiffuseMeanFreePath),
         (Some(_), Some(other)) => return Err(other.error("does not go together with `mean_free_path`")),
         (None, None) => return Err(item.error("has `albedo`, but no `mean_free_path` or `diffuse_mean_free_path`")),
     };
@@ -358,9 +356,7 @@ fn read_albedo(item: &Item, albedo: &Item, ior: f64) -> Result<(DVec3, DVec3)> {
     if lengths.min_element() < LENGTH_RANGE.0 {
         return Err(length.error(format!("must be at least {} m", LENGTH_RANGE.0)));
     }
-    medium::channels(|channel| {
-        medium::from_albedo(albedos[channel], lengths[channel], kind, ior).map_err(|problem| albedo.error(problem))
-    })
+    Ok(Appearance { albedo: albedos, length: lengths, kind })
 }
 
 /// Either draft of the scattering extension, over KHR_materials_volume.
@@ -412,7 +408,7 @@ fn read_scattering(
     warn_of_share(material, item, warnings)?;
     let (sigma_s_prime, sigma_a) =
         medium::channels(|channel| Ok(mapping.coefficients(sigma_t[channel], rho[channel], g[channel])))?;
-    Ok(Some(Medium { sigma_s_prime, sigma_a, g, source: name.into() }))
+    Ok(Some(Medium { sigma_s_prime, sigma_a, g, appearance: None, model: None, source: name.into() }))
 }
 
 /// sigma_t = -ln(attenuationColor) / attenuationDistance [1/m]; 0 without KHR_materials_volume.

@@ -1,5 +1,6 @@
 //! Scattering coefficients from what authors write: colours, albedos, mean free paths.
 
+use super::LengthKind;
 use crate::{Result, reference::profile::invert_total};
 use glam::DVec3;
 
@@ -32,25 +33,21 @@ impl Mapping {
     }
 }
 
-/// The length that comes with an albedo.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Length {
-    /// 1 / sigma_t'.
-    MeanFreePath,
-    /// 1 / sigma_tr.
-    DiffuseMeanFreePath,
-}
-
 /// (sigma_s', sigma_a) of one channel whose standard dipole has the total `albedo`.
 ///
 /// # Errors
 /// A diffuse mean free path with an albedo of 1, for which every sigma_s' has sigma_tr = 0.
-pub(super) fn from_albedo(albedo: f64, length: f64, kind: Length, ior: f64) -> std::result::Result<(f64, f64), String> {
+pub(super) fn from_albedo(
+    albedo: f64,
+    length: f64,
+    kind: LengthKind,
+    ior: f64,
+) -> std::result::Result<(f64, f64), String> {
     let e = invert_total(albedo, ior);
     let sigma_t = match kind {
-        Length::MeanFreePath => 1.0 / length,
-        Length::DiffuseMeanFreePath if e > 0.0 => 1.0 / (length * e),
-        Length::DiffuseMeanFreePath => return Err("an albedo of 1 has an infinite diffuse mean free path".into()),
+        LengthKind::MeanFreePath => 1.0 / length,
+        LengthKind::DiffuseMeanFreePath if e > 0.0 => 1.0 / (length * e),
+        LengthKind::DiffuseMeanFreePath => return Err("an albedo of 1 has an infinite diffuse mean free path".into()),
     };
     // e^2 = 3 (1 - alpha').
     let absorbed = sigma_t * (e * e / 3.0).min(1.0);

@@ -18,7 +18,7 @@ mod unit;
 pub use presets::{Preset, preset, presets};
 pub use unit::parse_unit;
 
-use crate::{Error, Result, shared};
+use crate::{Error, Result, settings::Model, shared};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
@@ -205,8 +205,32 @@ pub struct Medium {
     pub sigma_a: DVec3,
     /// Mean cosine of the phase function, -1 to 1.
     pub g: DVec3,
+    /// The surface albedo and length from which the coefficients came, if the file gives those.
+    pub appearance: Option<Appearance>,
+    /// The profile that the file names.
+    pub model: Option<Model>,
     /// Where the numbers came from: "preset skin1", "extras.bssrdf", "KHR_materials_scatter", ...
     pub source: String,
+}
+
+/// Matter as artists describe it, per channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Appearance {
+    /// Total of the profile, 0 to 1.
+    pub albedo: DVec3,
+    /// Metres.
+    pub length: DVec3,
+    /// What the length is.
+    pub kind: LengthKind,
+}
+
+/// A length that scales a profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LengthKind {
+    /// 1 / sigma_t'.
+    MeanFreePath,
+    /// 1 / sigma_tr.
+    DiffuseMeanFreePath,
 }
 
 /// A delta light, in metres.

@@ -6,10 +6,11 @@ use glam::{DVec3, Mat3, Vec3};
 use rayon::prelude::*;
 use translucent::Normalisation;
 use translucent::reference::accumulate::accumulate;
+use translucent::reference::profile::{self, Coefficients, Options};
 use translucent::reference::reproject::reproject;
 use translucent::reference::sample::sample;
 use translucent::reference::sums::Contribution;
-use translucent::reference::{Inputs, profile, step};
+use translucent::reference::{Inputs, step};
 use translucent::shared::*;
 
 /// Owner of everything that [`Inputs`] borrows.
@@ -43,7 +44,13 @@ impl World {
             environment_row2: Vec3::Z,
             ..Default::default()
         };
-        let features = Features { projection, environment: ENVIRONMENT_CONSTANT, batches: 1, ..Features::default() };
+        let features = Features {
+            projection,
+            environment: ENVIRONMENT_CONSTANT,
+            batches: 1,
+            models: 1 << material.model,
+            ..Features::default()
+        };
         World { features, view, materials: vec![material], ..Default::default() }
     }
 
@@ -60,6 +67,7 @@ impl World {
             texels: &self.texels,
             textures: &self.textures,
             coordinates: &self.coordinates,
+            profiles: &[],
         }
     }
 
@@ -111,7 +119,22 @@ impl World {
 /// Grey matter with the stated sigma_tr [1/length] and reduced albedo.
 pub fn matter(sigma_tr: f64, albedo: f64, ior: f64, normalisation: Normalisation) -> Material {
     let (sigma_s, sigma_a) = coefficients(sigma_tr, albedo);
-    profile::material(DVec3::splat(sigma_s), DVec3::splat(sigma_a), ior, normalisation, 1e-6)
+    standard(DVec3::splat(sigma_s), DVec3::splat(sigma_a), ior, normalisation, 1e-6)
+}
+
+/// The standard dipole of matter in three channels.
+pub fn standard(sigma_s: DVec3, sigma_a: DVec3, ior: f64, normalisation: Normalisation, radius_tail: f64) -> Material {
+    modelled(MODEL_STANDARD, sigma_s, sigma_a, ior, Options { normalisation, radius_tail })
+}
+
+/// Matter in three channels under a model, one of MODEL_*.
+pub fn modelled(model: u32, sigma_s: DVec3, sigma_a: DVec3, ior: f64, options: Options) -> Material {
+    profile::material(model, &channels(sigma_s, sigma_a, ior), options)
+}
+
+/// Three channels of isotropic matter.
+pub fn channels(sigma_s: DVec3, sigma_a: DVec3, ior: f64) -> [Coefficients; 3] {
+    [0, 1, 2].map(|c| Coefficients { sigma_s_prime: sigma_s[c], sigma_a: sigma_a[c], g: 0.0, ior, appearance: None })
 }
 
 /// sigma_s' and sigma_a: sigma_tr = sqrt(3 (1 - albedo)) sigma_t'.

@@ -2,7 +2,7 @@
 
 use super::{World, coefficients};
 use glam::{DVec3, dvec3};
-use translucent::reference::profile::Dipole;
+use translucent::reference::profile::{Dipole, Radial};
 use translucent::shared::{PROJECTION_CAMERA, Probe};
 
 /// The cameras: at a distance in radii, orthographic.

@@ -12,7 +12,7 @@ use translucent::{
     Projection, Renderer, Scene, Settings,
     reference::{
         boundary::{Side, diffuse_reflectance, transmittance},
-        profile::Dipole,
+        profile::{Dipole, Radial},
     },
     scene::{Environment, EnvironmentMap, LoadOptions},
 };

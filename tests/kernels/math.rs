@@ -65,6 +65,7 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         texels: &[],
         textures: &[],
         coordinates: &[],
+        profiles: &[],
     };
     let mut bench = bench();
     bench.add("math", &compile(), &inputs.features);

@@ -8,7 +8,6 @@ use translucent::{
     Normalisation::Energy,
     reference::{
         boundary::transmittance,
-        profile,
         projection::{fractions, seen},
         step,
     },
@@ -179,7 +178,7 @@ fn weights_are_bounded() {
     // weighs on a plane, strength / density, over the least fraction of the three axes: f_c / p <= planar_c / a_min. Of
     // several, one is lit with the sum of their weights over channels, each at most the largest planar_c / a_min.
     let (sigma_s, sigma_a) = (dvec3(2.19, 2.62, 3.0) * 3.0, dvec3(0.0021, 0.0041, 0.0071) * 3.0);
-    let material = profile::material(sigma_s, sigma_a, 1.0, Energy, 1e-6);
+    let material = standard(sigma_s, sigma_a, 1.0, Energy, 1e-6);
     let planar = material.strength.as_dvec3() / material.density.as_dvec3();
     let mut largest = 0f64;
     for eye in EYES {

@@ -5,7 +5,7 @@ use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 use translucent::Normalisation::Energy;
 use translucent::reference::math::{basis, integrate};
-use translucent::reference::profile;
+use translucent::reference::profile::plane_density;
 use translucent::reference::projection::*;
 use translucent::reference::reproject::reproject;
 use translucent::reference::sample::sample;
@@ -61,9 +61,9 @@ fn densities_are_the_planes_over_the_jacobian() {
                 let h = 1e-5;
                 let da = (x(a + h, b) - x(a - h, b)) / (2.0 * h);
                 let db = (x(a, b + h) - x(a, b - h)) / (2.0 * h);
-                let expected = plane_density(&material, a.hypot(b)) / da.cross(db).length();
+                let expected = plane_density((&material).into(), a.hypot(b)) / da.cross(db).length();
                 let at = x(a, b);
-                let found = density(technique, &material, &seen, at, (at + normal).normalize());
+                let found = density(technique, (&material).into(), &seen, at, (at + normal).normalize());
                 assert!(
                     (found / expected - 1.0).abs() < 1e-7,
                     "technique {technique} 1/l {inverse_distance} ({a}, {b}): {found} for {expected}"
@@ -79,8 +79,8 @@ fn behind_the_eye_there_is_no_density() {
     let (world, surface) = plane(material, PROJECTION_MIS, 1, 0.3, true);
     let seen = seen(&world.inputs(), &surface);
     let behind = seen.wo * (seen.eye_distance * 1.01);
-    assert_eq!(density(CAMERA, &material, &seen, behind, DVec3::Z), 0.0);
-    assert!(density(CAMERA, &material, &seen, behind * 0.9, DVec3::Z) >= 0.0);
+    assert_eq!(density(CAMERA, (&material).into(), &seen, behind, DVec3::Z), 0.0);
+    assert!(density(CAMERA, (&material).into(), &seen, behind * 0.9, DVec3::Z) >= 0.0);
 }
 
 #[test]
@@ -97,11 +97,11 @@ fn a_density_is_one_over_the_plane() {
     };
     let expected = [1.0, 0.0, 0.0, 1.0];
     for (technique, expected) in expected.into_iter().enumerate() {
-        let found = over_plane(&|delta| density(technique, &material, &seen, delta, DVec3::Z));
+        let found = over_plane(&|delta| density(technique, (&material).into(), &seen, delta, DVec3::Z));
         assert!((found - expected).abs() < 1e-6, "technique {technique}: {found}");
     }
     let fractions = fractions(PROJECTION_MIS, seen.normal.dot(seen.wo));
-    let mixture = over_plane(&|delta| mixture_density(PROJECTION_MIS, &material, &seen, delta, DVec3::Z));
+    let mixture = over_plane(&|delta| mixture_density(PROJECTION_MIS, (&material).into(), &seen, delta, DVec3::Z));
     assert!((mixture - fractions[NORMAL] - fractions[CAMERA]).abs() < 1e-6);
 }
 
@@ -127,7 +127,7 @@ fn hits_arrive_with_the_mixture_density() {
     // the orthographic camera at a grazing angle, and from inside.
     let material = {
         let (sigma_s, sigma_a) = coefficients(3.0, 0.9);
-        profile::material(dvec3(sigma_s, 2.0 * sigma_s, 0.0), DVec3::splat(sigma_a), 1.3, Energy, 0.0)
+        standard(dvec3(sigma_s, 2.0 * sigma_s, 0.0), DVec3::splat(sigma_a), 1.3, Energy, 0.0)
     };
     let faces: Vec<[DVec3; 3]> = cuboid(-DVec3::ONE, DVec3::ONE);
     let at = dvec3(0.55, 0.3, 1.0);
@@ -161,7 +161,7 @@ fn hits_arrive_with_the_mixture_density() {
                 both(su, &|u| {
                     both(sv, &|v| {
                         let x = a + (b - a) * u + (d - a) * v;
-                        mixture_density(PROJECTION_MIS, &material, &seen, x - at, normal)
+                        mixture_density(PROJECTION_MIS, (&material).into(), &seen, x - at, normal)
                     })
                 }) * 4.0
             })

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3, dvec3};
 use translucent::Normalisation::{self, Energy};
 use translucent::reference::area::{self, Corners, Lamp, Matter, Setting};
 use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
-use translucent::reference::profile::Dipole;
+use translucent::reference::profile::{Dipole, Radial};
 use translucent::shared::*;
 
 fn medium(sigma_tr: f64, albedo: f64, ior: f64, normalisation: Normalisation) -> Matter {
@@ -135,7 +135,7 @@ fn concave() -> Vec<Corners> {
 /// uniform light, in three channels. `blockers` belong to another set.
 fn compare(set: &[Corners], blockers: &[Corners], (triangle, weights): (usize, [f64; 3]), wo: DVec3, sun_to: DVec3) {
     let (sigma_s, sigma_a) = (dvec3(4.0, 8.0, 2.0), dvec3(0.3, 0.1, 0.02));
-    let material = translucent::reference::profile::material(sigma_s, sigma_a, 1.4, Energy, 1e-6);
+    let material = standard(sigma_s, sigma_a, 1.4, Energy, 1e-6);
     let [a, b, c] = set[triangle];
     let at = a * weights[0] + b * weights[1] + c * weights[2];
     let normal = (b - a).cross(c - a).normalize();

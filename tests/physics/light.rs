@@ -7,7 +7,7 @@ use translucent::Normalisation::Energy;
 use translucent::reference::boundary::{fresnel, transmittance};
 use translucent::reference::light::*;
 use translucent::reference::math::cosine_direction;
-use translucent::reference::profile::Dipole;
+use translucent::reference::profile::{Dipole, Radial};
 use translucent::reference::random::hash;
 use translucent::reference::reflect::reflect;
 use translucent::shared::*;
@@ -221,7 +221,7 @@ fn surfaces() -> [Material; 3] {
         alpha: 0.2,
         base_color: vec3(0.9, 0.5, 0.2),
         metallic: 1.0,
-        component_cdf: [0.0; 6],
+        component_cdf: [0.0; 9],
         ..Default::default()
     };
     [translucent, opaque, Material { metallic: 0.25, alpha: 0.5, ..opaque }]

@@ -4,7 +4,7 @@ use crate::common::*;
 use glam::DVec3;
 use translucent::Normalisation::{Energy, Jensen2001};
 use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
-use translucent::reference::profile::material;
+use translucent::reference::profile::{Dipole, Radial};
 use translucent::shared::*;
 
 const PROJECTIONS: [u32; 3] = [PROJECTION_MIS, PROJECTION_CAMERA, PROJECTION_NORMAL];
@@ -56,7 +56,7 @@ fn white_furnace() {
         for (projection, angle) in
             [(PROJECTION_MIS, 0.0), (PROJECTION_MIS, 75.0), (PROJECTION_NORMAL, 0.0), (PROJECTION_NORMAL, 75.0)]
         {
-            let white = material(DVec3::splat(1e3), DVec3::ZERO, ior, Energy, 1e-5);
+            let white = standard(DVec3::splat(1e3), DVec3::ZERO, ior, Energy, 1e-5);
             let (world, surface) = plane(white, projection, 64, f64::to_radians(angle), angle == 0.0);
             let inputs = world.inputs();
             let light = estimate(&world, 256, |index, step| subsurface(&inputs, step, index, &surface));
@@ -70,8 +70,7 @@ fn white_furnace() {
 #[test]
 fn uniform_light_leaves_alike_in_all_directions() {
     let grey = matter(1.0, 0.95, 1.3, Energy);
-    let total =
-        translucent::reference::profile::Dipole::new(coefficients(1.0, 0.95).0, coefficients(1.0, 0.95).1, 1.3).total();
+    let total = Dipole::new(coefficients(1.0, 0.95).0, coefficients(1.0, 0.95).1, 1.3).total();
     for projection in PROJECTIONS {
         for angle in [0.0f64, 60.0, 85.0] {
             // The eye is far: on a plane even the exponential of the method as given is unbiased, and finite.
@@ -96,7 +95,7 @@ fn shaded(shading: DVec3, wo_angle: f64, wi: DVec3) -> f64 {
     let inputs = world.inputs();
     let found = estimate(&world, 256, |index, step| subsurface(&inputs, step, index, &surface));
     let (sigma_s, sigma_a) = coefficients(1.0, 0.95);
-    let total = translucent::reference::profile::Dipole::new(sigma_s, sigma_a, 1.3).total();
+    let total = Dipole::new(sigma_s, sigma_a, 1.3).total();
     let scale = total / (std::f64::consts::PI * (1.0 - diffuse_reflectance(1.3, Side::Outside)));
     assert!(found.error.x <= 2e-3 * found.mean.x, "{found:?}");
     found.mean.x / scale
@@ -125,7 +124,7 @@ fn interpolated_normals_are_in_fresnel_and_cosines_alone() {
 fn interpolated_normals_are_those_of_the_hit() {
     // Matter with a mean free path of 1e-3 is lit where it is seen: the irradiance there follows the three normals.
     let (sigma_s, sigma_a) = coefficients(2e3, 0.95);
-    let dense = material(DVec3::splat(sigma_s), DVec3::splat(sigma_a), 1.0, Energy, 1e-6);
+    let dense = standard(DVec3::splat(sigma_s), DVec3::splat(sigma_a), 1.0, Energy, 1e-6);
     let mut world = World::new(dense, PROJECTION_MIS, 64);
     world.features.environment = ENVIRONMENT_NONE;
     world.triangle([DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0]);
@@ -134,7 +133,7 @@ fn interpolated_normals_are_those_of_the_hit() {
     (s.normal0, s.normal1, s.normal2) = (normals[0].as_vec3(), normals[1].as_vec3(), normals[2].as_vec3());
     let wi = DVec3::new(0.5, -0.3, 1.0).normalize();
     world.light(sun(-wi, 1.0));
-    let total = translucent::reference::profile::Dipole::new(sigma_s, sigma_a, 1.0).total();
+    let total = Dipole::new(sigma_s, sigma_a, 1.0).total();
     for weights in [[0.2, 0.5, 0.3], [0.6, 0.1, 0.3]] {
         let at = DVec3::new(4.0 * weights[1], 4.0 * weights[2], 0.0);
         world.look(at + 3.0 * DVec3::Z, at, 1e-4);

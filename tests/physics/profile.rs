@@ -1,5 +1,6 @@
 //! The standard dipole: closed forms against quadrature, golden values, sampler against distribution.
 
+use crate::common::standard;
 use glam::{DVec3, dvec3};
 use std::f64::consts::{PI, TAU};
 use translucent::Normalisation;
@@ -99,10 +100,10 @@ fn inversion_of_the_total() {
 #[test]
 fn sampler_inverts_its_distribution() {
     for sigma in [0.0, 1e-9, 1e-3, 0.4, 1.0, 30.0] {
-        let dipole = Dipole { albedo: 1.0, sigma_tr: sigma, z_real: 1.0, z_virtual: 4.0 };
         for u in [0.0, 1e-12, 1e-6, 0.1, 0.5, 0.9, 0.999, 1.0 - 2f64.powi(-24)] {
             for z in [1.0, 4.0] {
-                let (d, r) = (dipole.distance(u, z), dipole.radius(u, z));
+                let source = Source { sigma, z };
+                let (d, r) = (source.distance(u), source.radius(u));
                 assert!(d >= z && d.is_finite());
                 let rise = r * r / (d + z);
                 let below = (-sigma * rise).exp() * rise / d - (-sigma * rise).exp_m1();
@@ -111,8 +112,8 @@ fn sampler_inverts_its_distribution() {
             }
         }
     }
-    let white = matter(1.0, 1.3);
-    assert!((white.distance(0.75, 2.0) - 8.0).abs() < 1e-13, "sigma_tr = 0: d = z / (1 - u)");
+    let white = Source { sigma: 0.0, z: 2.0 };
+    assert!((white.distance(0.75) - 8.0).abs() < 1e-13, "sigma_tr = 0: d = z / (1 - u)");
 }
 
 #[test]
@@ -126,7 +127,7 @@ fn samples_follow_the_profile() {
         .map(|i| {
             let u = f64::from(translucent::reference::random::hash(2 * i)) / 2f64.powi(32);
             let v = f64::from(translucent::reference::random::hash(2 * i + 1)) / 2f64.powi(32);
-            dipole.radius(u, if v < first { dipole.z_real } else { dipole.z_virtual })
+            dipole.radius(usize::from(v >= first), 0.0, u)
         })
         .collect();
     radii.sort_by(f64::total_cmp);
@@ -153,12 +154,12 @@ fn radius_of_a_tail() {
 #[test]
 fn material_holds_the_profile() {
     let (sigma_s, sigma_a) = (dvec3(2.19, 0.0, 0.74), dvec3(0.0021, 1.0, 0.032));
-    let material = material(sigma_s, sigma_a, 1.5, Normalisation::Energy, 1e-6);
+    let material = standard(sigma_s, sigma_a, 1.5, Normalisation::Energy, 1e-6);
     assert_eq!(material.flags, TRANSLUCENT);
     assert_eq!(material.density.y, 0.0);
     assert_eq!(material.strength.y, 0.0);
-    assert_eq!(material.component_cdf[1], material.component_cdf[3]);
-    assert_eq!(material.component_cdf[5], 1.0);
+    assert_eq!(material.component_cdf[1], material.component_cdf[5]);
+    assert_eq!(material.component_cdf[8], 1.0);
     assert!((material.component_cdf[1] - 0.5).abs() < 1e-6);
     let mut radius = 0f64;
     for c in [0, 2] {
@@ -173,19 +174,19 @@ fn material_holds_the_profile() {
     assert_eq!(material.camera_rate, material.sigma_tr.x.min(material.sigma_tr.z));
     assert!(material.camera_rate > 0.0);
 
-    let black = translucent::reference::profile::material(DVec3::ZERO, DVec3::ONE, 1.3, Normalisation::Energy, 1e-6);
-    assert_eq!(black.component_cdf, [0.0; 6]);
+    let black = standard(DVec3::ZERO, DVec3::ONE, 1.3, Normalisation::Energy, 1e-6);
+    assert_eq!(black.component_cdf, [0.0; 9]);
     assert_eq!(black.strength, glam::Vec3::ZERO);
     assert!(black.z_real.is_finite() && black.z_virtual.is_finite());
 
-    let white = translucent::reference::profile::material(DVec3::ONE, DVec3::ZERO, 1.3, Normalisation::Energy, 0.0);
+    let white = standard(DVec3::ONE, DVec3::ZERO, 1.3, Normalisation::Energy, 0.0);
     assert_eq!(white.radius_max, UNBOUNDED);
     assert_eq!(white.camera_rate, 0.0);
 }
 
 #[test]
 fn jensen_is_darker_by_what_the_surface_reflects() {
-    let of = |normalisation| material(DVec3::ONE, DVec3::splat(0.1), 1.3, normalisation, 1e-6).strength.x;
+    let of = |normalisation| standard(DVec3::ONE, DVec3::splat(0.1), 1.3, normalisation, 1e-6).strength.x;
     let ratio = f64::from(of(Normalisation::Jensen2001)) / f64::from(of(Normalisation::Energy));
     assert!((ratio - (1.0 - diffuse_reflectance(1.3, Side::Outside))).abs() < 2e-7, "{ratio}");
 }

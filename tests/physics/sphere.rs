@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use translucent::Normalisation::Energy;
 use translucent::reference::accumulate::{accumulate, choose};
 use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
-use translucent::reference::profile::Dipole;
-use translucent::reference::projection::{CAMERA, density, fractions, plane_density, seen, shapes};
+use translucent::reference::profile::{Dipole, Radial};
+use translucent::reference::profile::{plane_density, shapes};
+use translucent::reference::projection::{CAMERA, density, fractions, seen};
 use translucent::reference::random::hash;
 use translucent::reference::sample::sample;
 use translucent::reference::step;
@@ -107,7 +108,7 @@ fn weights_are_bounded() {
     // A hit of any surface weighs, per channel, at most what it weighs on a plane over the least fraction of the three
     // axes: f_c / p <= strength_c mass_c / (a_min b_c).
     let (sigma_s, sigma_a) = (dvec3(2.19, 2.62, 3.0) * 3.0, dvec3(0.0021, 0.0041, 0.0071) * 3.0);
-    let material = translucent::reference::profile::material(sigma_s, sigma_a, 1.5, Energy, 1e-6);
+    let material = standard(sigma_s, sigma_a, 1.5, Energy, 1e-6);
     let planar = material.strength.as_dvec3() / material.density.as_dvec3();
     let mut largest = 0f64;
     for eye in [Eye::At(3.0), Eye::At(50.0), Eye::Infinite] {
@@ -124,7 +125,7 @@ fn weights_are_bounded() {
                 if hits.count == 0 {
                     continue;
                 }
-                let chosen = choose(&world.inputs(), &step, 0, &material, &seen, &probe, &hits);
+                let chosen = choose(&world.inputs(), &step, 0, (&material).into(), &seen, &probe, &hits);
                 let (_, factor) = chosen.expect("a hit in the ball has weight");
                 // The reservoir multiplies by W / w_j; the sum over hits is bounded by their number.
                 let share = (factor / planar).element_sum() / 3.0 * least / f64::from(hits.count);
@@ -141,7 +142,7 @@ fn the_given_method_divides_by_its_density() {
     // s e^(-s r) / (2 pi r) in the plane, carried by the same lines as the mixture's camera rays, whose Jacobian is
     // tested by differences: factor = strength shape(rho) / (that density). The eye is near, so that q matters.
     let (sigma_s, sigma_a) = (dvec3(2.19, 2.62, 3.0) * 3.0, dvec3(0.0021, 0.0041, 0.0071) * 3.0);
-    let material = translucent::reference::profile::material(sigma_s, sigma_a, 1.5, Energy, 1e-6);
+    let material = standard(sigma_s, sigma_a, 1.5, Energy, 1e-6);
     let rate = f64::from(material.camera_rate);
     assert_eq!(material.camera_rate, material.sigma_tr.min_element());
     for (eye, angle) in [(Eye::At(1.6), 30.0), (Eye::At(3.0), 60.0), (Eye::Infinite, 45.0)] {
@@ -160,10 +161,12 @@ fn the_given_method_divides_by_its_density() {
             let delta = probe.offset.as_dvec3() + f64::from(hits.t[0]) * probe.direction.as_dvec3();
             let normal = (ball.position + delta).normalize();
             let r = probe.offset.as_dvec3().length();
-            let jacobian = density(CAMERA, &material, &seen, delta, normal) / plane_density(&material, r);
+            let jacobian =
+                density(CAMERA, (&material).into(), &seen, delta, normal) / plane_density((&material).into(), r);
             let p = rate * (-rate * r).exp() / (std::f64::consts::TAU * r) * jacobian;
-            let expected = material.strength.as_dvec3() * shapes(&material, delta.length()) / p;
-            let (_, factor) = choose(&world.inputs(), &step, 0, &material, &seen, &probe, &hits).expect("one hit");
+            let expected = material.strength.as_dvec3() * shapes((&material).into(), delta.length()) / p;
+            let (_, factor) =
+                choose(&world.inputs(), &step, 0, (&material).into(), &seen, &probe, &hits).expect("one hit");
             // Near the silhouette the normal's rounding, 1e-7, is divided by its cosine; near xo, delta's by rho.
             let cosine = normal.dot(probe.direction.as_dvec3()).abs();
             let tolerance = 1e-5 * (1.0 + 0.1 / cosine + 0.1 / delta.length());
@@ -207,7 +210,7 @@ fn the_given_method_has_its_known_tail() {
             let probe = sample(&ball.world.inputs(), &step, index, &ball.surface);
             let hits = ball.hits(&probe, &mut world);
             if hits.count > 0 {
-                let chosen = choose(&world.inputs(), &step, index, &material, &seen, &probe, &hits);
+                let chosen = choose(&world.inputs(), &step, index, (&material).into(), &seen, &probe, &hits);
                 weights.extend(chosen.map(|(_, factor)| factor.x));
             }
         }

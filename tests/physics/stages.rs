@@ -5,7 +5,6 @@ use glam::{DVec3, Vec3, dvec3, vec3};
 use translucent::Normalisation::Energy;
 use translucent::reference::accumulate::accumulate;
 use translucent::reference::primary::{camera_ray, primary};
-use translucent::reference::profile::material;
 use translucent::reference::random::{hash, key, unit};
 use translucent::reference::reflect::reflect;
 use translucent::reference::reproject::reproject;
@@ -17,7 +16,7 @@ use translucent::shared::*;
 
 /// A cube of three-coloured matter on a matt floor, under a lamp and uniform light; width x height pixels.
 fn still_life(projection: u32, width: u32, height: u32) -> World {
-    let matter = material(dvec3(4.0, 8.0, 2.0), dvec3(0.3, 0.1, 0.02), 1.4, Energy, 1e-6);
+    let matter = standard(dvec3(4.0, 8.0, 2.0), dvec3(0.3, 0.1, 0.02), 1.4, Energy, 1e-6);
     let mut world = World::new(Material { alpha: 0.2, ..matter }, projection, width);
     world.materials.push(Material { ior: 1.5, alpha: 0.3, base_color: Vec3::splat(0.5), ..Default::default() });
     cuboid(dvec3(-0.5, -0.5, 0.0), dvec3(0.5, 0.5, 1.0)).into_iter().for_each(|t| world.triangle(t));
@@ -158,7 +157,8 @@ fn long_hit_lists_are_unbiased() {
     // so compare the weights: their mean is the integral of f over all sheets, which is a sum of closed forms.
     use translucent::reference::accumulate::choose;
     use translucent::reference::math::integrate;
-    use translucent::reference::projection::{seen, shapes};
+    use translucent::reference::profile::shapes;
+    use translucent::reference::projection::seen;
     for projection in [PROJECTION_NORMAL, PROJECTION_MIS] {
         let (world, surface) = sheets(projection);
         let inputs = world.inputs();
@@ -171,7 +171,7 @@ fn long_hit_lists_are_unbiased() {
                 // In the ball, by the distance rho from xo: dA = 2 pi rho d rho.
                 integrate(z.max(1e-9).ln(), radius.ln(), 40, |x| {
                     let rho = x.exp();
-                    f64::from(material.strength.x) * shapes(material, rho).x * std::f64::consts::TAU * rho * rho
+                    f64::from(material.strength.x) * shapes(material.into(), rho).x * std::f64::consts::TAU * rho * rho
                 })
             })
             .sum();
@@ -181,7 +181,8 @@ fn long_hit_lists_are_unbiased() {
             if hits.count == 0 {
                 return DVec3::ZERO;
             }
-            choose(&inputs, step, index, material, &seen, &probe, &hits).map_or(DVec3::ZERO, |(_, factor)| factor)
+            choose(&inputs, step, index, material.into(), &seen, &probe, &hits)
+                .map_or(DVec3::ZERO, |(_, factor)| factor)
         });
         found.check(expected, 1e-5, &format!("projection {projection}"));
     }
@@ -216,7 +217,7 @@ fn nothing_is_probed_where_nothing_is_translucent() {
         assert_eq!(valid(accumulate(&inputs, &step, 0, &surface, &probe, &hits)), DVec3::ZERO);
     }
     let mut black = world.clone();
-    black.materials[0] = material(DVec3::ZERO, DVec3::ONE, 1.3, Energy, 1e-6);
+    black.materials[0] = standard(DVec3::ZERO, DVec3::ONE, 1.3, Energy, 1e-6);
     let top = black.surface(10, dvec3(0.1, 0.2, 1.0));
     let probe = sample(&black.inputs(), &step, 0, &top);
     assert!(probe.t_min > probe.t_max, "matter that does not scatter");

@@ -20,7 +20,7 @@ fn wrong_usage_and_input_end_with_2_and_a_message_and_leave_nothing() {
         ("render SPOT --error 1%", "--error"),
         ("render SPOT --reproject screen", "screen"),
         ("render SPOT --projection sideways", "sideways"),
-        ("render SPOT --model burley", "burley"),
+        ("render SPOT --model magic", "magic"),
         ("render missing.glb", "missing.glb"),
         ("render garbage.glb", "garbage.glb"),
         ("render empty.gltf", "empty.gltf"),

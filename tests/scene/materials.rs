@@ -3,6 +3,7 @@
 use crate::build::*;
 use glam::DVec3;
 use serde_json::{Value, json};
+use translucent::Model;
 use translucent::scene::{LoadOptions, Material, Medium};
 
 /// Total diffuse reflectance of the standard dipole (Jensen & Buhler 2002), with the Fresnel moment in closed form
@@ -289,7 +290,6 @@ fn warnings_name_what_is_left_out() {
         (json!({"extensions": {"KHR_materials_ior": {"ior": 0}}}), "0 (a full reflector"),
         (json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}), "refraction through clear"),
         (json!({"extensions": {"KHR_materials_clearcoat": {}}}), "clear coat (KHR_materials_clearcoat)"),
-        (json!({"extras": {"bssrdf": {"preset": "skin1", "model": "burley"}}}), "the burley model is not built yet"),
         (
             json!({"extras": {"bssrdf": {"preset": "ketchup"}}}),
             "preset ketchup absorbs more than it scatters in green, blue",
@@ -318,8 +318,9 @@ fn warnings_name_what_is_left_out() {
     let texture = scattering("KHR_materials_volume_scatter", "multiscatterColorTexture", texture);
     assert!(texture.contains("multiscatterColorTexture: textures are not modelled"), "{texture}");
 
-    let model = json!({"extras": {"bssrdf": {"preset": "skin1", "model": "standard"}}});
-    assert_eq!(warnings(model), Vec::<String>::new());
+    let model = |name: &str| json!({"extras": {"bssrdf": {"preset": "skin1", "model": name}}});
+    assert_eq!(warnings(model("standard")), Vec::<String>::new());
+    assert_eq!(medium(model("burley")).model, Some(Model::Burley));
 }
 
 #[test]

@@ -1,0 +1,288 @@
+//! Profiles: how much light leaves matter at a distance from where it entered. One file per model, one interface, and
+//! one line per model in the table below. Twin of `profile.glsl`; a model's mathematics is in its own file.
+//!
+//! # What a profile is
+//! Rd(r) = strength x shape(r) is exitance per unit of flux that has entered [1/length^2]. What leaves towards wo is
+//!
+//!   S = Ft(wi) Ft(wo) Rd(r) / (pi (1 - rho_e)),
+//!
+//! whose last factor (E. d'Eon, "A better dipole", 2012) makes the light over all directions equal Rd; Jensen et al. 2001,
+//! eq. 5, have 1 / pi.
+//!
+//! # Sampling
+//! shape is a sum of up to three components, each of which its model draws exactly. A channel is picked, then one of its
+//! components by its part of the integral of shape, with one number for both; the radius with another. So the density
+//! per area of the plane is the shapes of the channels, each over its integral, averaged: the weight of a point on a
+//! plane does not depend on r.
+
+mod source;
+pub mod standard;
+
+pub use source::Source;
+pub use standard::{Dipole, boundary_factor, invert_total};
+
+use super::boundary::{Side, diffuse_reflectance};
+use crate::scene::{LengthKind, Medium};
+use crate::settings::{Model, Normalisation};
+use crate::shared::{self, MODEL_STANDARD, Material, TRANSLUCENT};
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+use std::ops::Deref;
+
+/// Radius that stands for "no ball".
+pub const UNBOUNDED: f32 = 1e30;
+
+/// Components of one channel's sampler at most.
+pub const COMPONENTS: usize = 3;
+
+/// One channel of homogeneous matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coefficients {
+    /// Reduced scattering [1/length], >= 0.
+    pub sigma_s_prime: f64,
+    /// Absorption [1/length], >= 0.
+    pub sigma_a: f64,
+    /// Mean cosine of the phase function, above -1 and below 1.
+    pub g: f64,
+    /// Index of refraction, inside over outside, > 0.
+    pub ior: f64,
+    /// The total (0 to 1) and length that an author gave in place of coefficients.
+    pub appearance: Option<(f64, f64, LengthKind)>,
+}
+
+impl Coefficients {
+    /// Channel `c` of a medium [1/m].
+    pub fn of(medium: &Medium, ior: f64, c: usize) -> Coefficients {
+        Coefficients {
+            sigma_s_prime: medium.sigma_s_prime[c],
+            sigma_a: medium.sigma_a[c],
+            g: medium.g[c],
+            ior,
+            appearance: medium.appearance.map(|given| (given.albedo[c], given.length[c], given.kind)),
+        }
+    }
+
+    /// The same matter in units of which the present one has `scale`.
+    pub fn in_units(self, scale: f64) -> Coefficients {
+        Coefficients {
+            sigma_s_prime: self.sigma_s_prime / scale,
+            sigma_a: self.sigma_a / scale,
+            appearance: self.appearance.map(|(albedo, length, kind)| (albedo, length * scale, kind)),
+            ..self
+        }
+    }
+}
+
+/// The profile of one channel, as function of the distance r on the surface.
+pub trait Radial {
+    /// shape(r) e^exponent [1/length^2].
+    fn shape_shifted(&self, r: f64, exponent: f64) -> f64;
+
+    /// Rd over shape; 0 for matter that does not scatter.
+    fn strength(&self) -> f64;
+
+    /// Integral of shape over the plane, by components of the sampler.
+    fn masses(&self) -> [f64; COMPONENTS];
+
+    /// Integral of shape within a radius.
+    fn inside(&self, radius: f64) -> f64;
+
+    /// Integral of shape beyond a radius.
+    fn outside(&self, radius: f64) -> f64;
+
+    /// Hankel transform of shape: int 2 pi r shape(r) J_0(k r) dr.
+    fn response(&self, k: f64) -> f64;
+
+    /// Radius of the point of a component that two numbers in [0, 1) pick.
+    fn radius(&self, component: usize, share: f64, u: f64) -> f64;
+
+    /// Rate at which the profile falls at large radii [1/length].
+    fn rate(&self) -> f64;
+
+    /// Writes what kernels read of channel `c`, but for strength, density and component_cdf.
+    fn pack(&self, c: usize, material: &mut Material);
+
+    /// Rd over strength [1/length^2].
+    fn shape(&self, r: f64) -> f64 {
+        self.shape_shifted(r, 0.0)
+    }
+
+    /// Integral of shape over the plane.
+    fn mass(&self) -> f64 {
+        self.masses().iter().sum()
+    }
+
+    /// Exitance per unit flux that entered at distance r [1/length^2].
+    fn rd(&self, r: f64) -> f64 {
+        self.strength() * self.shape(r)
+    }
+
+    /// Total of the profile.
+    fn total(&self) -> f64 {
+        self.strength() * self.mass()
+    }
+
+    /// Part of the total within `radius`.
+    fn cdf(&self, radius: f64) -> f64 {
+        self.strength() * self.inside(radius)
+    }
+
+    /// Amplitude of the exitance under the irradiance cos(k x).
+    fn mtf(&self, k: f64) -> f64 {
+        self.strength() * self.response(k)
+    }
+
+    /// Smallest radius beyond which at most `share` of the total lies; infinite for share <= 0.
+    fn radius_beyond(&self, share: f64) -> f64 {
+        if share <= 0.0 {
+            return f64::INFINITY;
+        }
+        let allowed = share * self.mass();
+        if self.outside(0.0) <= allowed {
+            return 0.0;
+        }
+        let (mut below, mut above) = (0.0, 1.0);
+        while self.outside(above) > allowed {
+            below = above;
+            above *= 2.0;
+        }
+        while above - below > 1e-14 * above {
+            let middle = (below + above) / 2.0;
+            *(if self.outside(middle) > allowed { &mut below } else { &mut above }) = middle;
+        }
+        above
+    }
+}
+
+macro_rules! models {
+    ($($setting:ident, $constant:ident: $type:ty;)*) => {
+        /// One channel's profile, of whichever model.
+        #[derive(Clone, Copy, Debug)]
+        pub enum Profile { $($setting($type),)* }
+
+        impl Deref for Profile {
+            type Target = dyn Radial + 'static;
+
+            fn deref(&self) -> &(dyn Radial + 'static) {
+                match self { $(Profile::$setting(profile) => profile,)* }
+            }
+        }
+
+        /// MODEL_* of a model, if it is built.
+        pub fn constant(model: Model) -> Option<u32> {
+            match model {
+                $(Model::$setting => Some($constant),)*
+                _ => None,
+            }
+        }
+
+        impl Profile {
+            /// The profile of matter.
+            pub fn new(model: u32, matter: &Coefficients) -> Profile {
+                match model {
+                    $($constant => Profile::$setting(<$type>::of(matter)),)*
+                    _ => unreachable!("a model of the table"),
+                }
+            }
+
+            /// The profile of channel `c` as a kernel reads it; its strength is 1.
+            pub fn unpack(matter: Matter, c: usize) -> Profile {
+                match matter.material.model {
+                    $($constant => Profile::$setting(<$type>::unpack(matter, c)),)*
+                    _ => unreachable!("a model of the table"),
+                }
+            }
+        }
+    };
+}
+models! {
+    Standard, MODEL_STANDARD: Dipole;
+}
+
+/// A material with what else its profile reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Matter<'a> {
+    pub material: &'a Material,
+    /// Tabulated profiles of all materials.
+    pub tables: &'a [f32],
+}
+
+impl<'a> From<&'a Material> for Matter<'a> {
+    /// A material that needs no table.
+    fn from(material: &'a Material) -> Matter<'a> {
+        Matter { material, tables: &[] }
+    }
+}
+
+/// shape(r) e^exponent of the three channels.
+pub fn shapes_shifted(matter: Matter, r: f64, exponent: f64) -> DVec3 {
+    DVec3::from([0, 1, 2].map(|c| Profile::unpack(matter, c).shape_shifted(r, exponent)))
+}
+
+/// shape(r) of the three channels.
+pub fn shapes(matter: Matter, r: f64) -> DVec3 {
+    shapes_shifted(matter, r, 0.0)
+}
+
+/// Density of the sampled radii per area of the plane.
+pub fn plane_density(matter: Matter, r: f64) -> f64 {
+    matter.material.density.as_dvec3().dot(shapes(matter, r))
+}
+
+/// The radius that two numbers in [0, 1) pick.
+pub fn draw_radius(matter: Matter, u_component: f64, u_radius: f64) -> f64 {
+    let cdf = matter.material.component_cdf.map(f64::from);
+    let component = cdf.iter().position(|&end| u_component < end).unwrap_or(cdf.len() - 1);
+    let start = if component == 0 { 0.0 } else { cdf[component - 1] };
+    let share = if cdf[component] > start { (u_component - start) / (cdf[component] - start) } else { 0.0 };
+    Profile::unpack(matter, component / COMPONENTS).radius(component % COMPONENTS, share, u_radius)
+}
+
+/// What the kernels' constants depend on besides the matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    pub normalisation: Normalisation,
+    /// Share of the energy beyond `radius_max`; 0 has no ball.
+    pub radius_tail: f64,
+}
+
+/// The BSSRDF part of a material as kernels read it; the rest is zero, for the caller to fill. `model` is one of MODEL_*.
+///
+/// Coefficients in 1/internal unit. Channels that scatter are equally probable; within one, a component is as probable
+/// as its part of the mass.
+pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> shared::Material {
+    let ior = matter[0].ior;
+    let channels = matter.each_ref().map(|matter| Profile::new(model, matter));
+    let scattering = || channels.iter().filter(|c| c.strength() > 0.0);
+    let probability = 1.0 / scattering().count().max(1) as f64;
+    let leaving = match options.normalisation {
+        Normalisation::Energy => PI * (1.0 - diffuse_reflectance(ior, Side::Outside)),
+        Normalisation::Jensen2001 => PI,
+    };
+
+    let mut material = Material { model, ior: ior as f32, flags: TRANSLUCENT, ..Material::default() };
+    let mut cumulative = 0.0;
+    for (c, channel) in channels.iter().enumerate() {
+        channel.pack(c, &mut material);
+        if channel.strength() == 0.0 {
+            continue;
+        }
+        material.strength[c] = (channel.strength() / leaving) as f32;
+        material.density[c] = (probability / channel.mass()) as f32;
+        let masses = channel.masses();
+        let last = masses.iter().rposition(|&mass| mass > 0.0).unwrap_or(0);
+        for (s, mass) in masses.into_iter().enumerate() {
+            cumulative += probability * mass / channel.mass();
+            material.component_cdf[COMPONENTS * c + s..].fill(cumulative as f32);
+        }
+        // The last component of the last channel that scatters ends at 1 exactly.
+        if channels[c + 1..].iter().all(|later| later.strength() == 0.0) {
+            material.component_cdf[COMPONENTS * c + last..].fill(1.0);
+        }
+    }
+    let radius_max = scattering().map(|c| c.radius_beyond(options.radius_tail)).fold(0.0, f64::max);
+    material.radius_max = (radius_max as f32).min(UNBOUNDED);
+    material.camera_rate = scattering().map(|c| c.rate()).reduce(f64::min).unwrap_or(0.0) as f32;
+    material.base_color = Vec3::ZERO;
+    material
+}
