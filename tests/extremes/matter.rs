@@ -10,7 +10,7 @@ use translucent::{
     Scene, Settings,
     reference::{
         boundary::{Side, diffuse_reflectance, transmittance},
-        profile::Dipole,
+        profile::{Dipole, Radial},
     },
     scene::Environment,
 };

@@ -9,7 +9,7 @@ use translucent::{
     Settings,
     reference::{
         boundary::{Side, diffuse_reflectance, transmittance},
-        profile::Dipole,
+        profile::{Dipole, Radial},
     },
 };
 
