@@ -12,6 +12,7 @@
 #include "light.glsl"
 #include "sums.glsl"
 SHADINGS(readonly);
+#include "emitter.glsl"
 SURFACES(readonly);
 PROBES(readonly);
 HIT_LISTS(readonly);
@@ -33,6 +34,12 @@ vec3 camera_factor(Seen s, Material m, Probe probe, vec3 delta, vec3 n) {
     // A hit in its own plane's direction has no density.
     float jacobian = cos_hit > 0.0 && q > 0.0 ? abs(dot(s.normal, d)) / (cos_hit * q * q) : 0.0;
     return value * (2.0 * PI * probe.radius / m.camera_rate * jacobian);
+}
+
+// Density per solid angle of the directions that are drawn: the cosine, or half of it and half of the image's.
+float direction_density(View view, vec3 direction, float c) {
+    if (ENVIRONMENT_KIND != ENVIRONMENT_IMAGE) return 1.0 / PI * c;
+    return 0.5 * environment_density(view, direction) + 0.5 / PI * c;
 }
 
 // Adds to the sums of the pixel and, where they are kept, of the sample's batch.
@@ -111,17 +118,31 @@ void main() {
     vec3 position = s.position + delta;
 
     vec3 entering = vec3(0.0);
+    uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
     for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
         vec3 direction;
         float distance = 1e30;
         vec3 light;
+        uint target = MISS;
+        float directional = 0.0;
         if (k < view.light_count) {
             Incoming incoming = delta_light(k, position);
             direction = incoming.direction;
             distance = incoming.distance;
             light = incoming.irradiance * max(dot(shading_n, direction), 0.0);
-        } else {
+        } else if (EMISSIVE != 0 && k < first_direction) {
             uint j = k - view.light_count;
+            vec2 u = random_point(key, batch, DIM_EMITTER, step_.sample_index / BATCHES * view.directions + j);
+            EmitterPoint point = draw_emitter(view, position, n * SHADOW_OFFSET, u);
+            direction = point.direction;
+            distance = point.distance * EMITTER_REACH;
+            target = point.triangle;
+            float c = max(dot(shading_n, direction), 0.0);
+            directional = direction_density(view, direction, c);
+            light = combined(emitted(target, point.barycentric, direction), point.density, point.distance, target,
+                direction, directional) * (c / float(view.directions));
+        } else {
+            uint j = k - first_direction;
             vec2 u = random_point(key, batch, DIM_LIGHT, step_.sample_index / BATCHES * view.directions + j);
             // The image and the cosine, half of the directions each, combined by the balance heuristic.
             bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
@@ -131,13 +152,23 @@ void main() {
                 direction = draw_cosine(shading_n, vec2(image ? 2.0 * u.x - 1.0 : u.x, u.y));
             }
             float c = max(dot(shading_n, direction), 0.0);
-            float over_density = PI;
-            if (image) over_density = c / (0.5 * environment_density(view, direction) + 0.5 / PI * c);
+            directional = direction_density(view, direction, c);
+            float over_density = image ? c / directional : PI;
             light = c > 0.0 ? environment_radiance(view, direction) * (over_density / float(view.directions)) : vec3(0.0);
         }
         float cos_shading = dot(shading_n, direction);
-        bool open = dot(n, direction) > 0.0 && cos_shading > 0.0 && light.x + light.y + light.z > 0.0;
-        traverse(Ray(position, n * SHADOW_OFFSET, direction, 0.0, open ? distance : -1.0), ANY, EVERY_SET, 0u);
+        bool open = dot(n, direction) > 0.0 && cos_shading > 0.0
+            && (EMISSIVE != 0 && k >= first_direction || light.x + light.y + light.z > 0.0);
+        traverse(Ray(position, n * SHADOW_OFFSET, direction, 0.0, open ? distance : -1.0),
+            EMISSIVE != 0 ? CLOSEST : ANY, EVERY_SET, 0u);
+        if (EMISSIVE != 0 && open && hit_count != 0u) {
+            uint found = hit_triangle[0];
+            if (k >= first_direction) {
+                light = combined(emitted(found, hit_barycentric, direction), emitter_density(view, found), hit_t[0],
+                    found, direction, directional) * (cos_shading / float(view.directions));
+            }
+            if (k >= first_direction || found == target) hit_count = 0u;
+        }
         if (open && hit_count == 0u) entering += light * transmittance(m.ior, cos_shading);
     }
 

@@ -12,6 +12,7 @@
 #include "light.glsl"
 #include "sums.glsl"
 SHADINGS(readonly);
+#include "emitter.glsl"
 SURFACES(readonly);
 
 // BRDF x cosine for directions in the frame where the shading normal is z.
@@ -79,18 +80,28 @@ void main() {
         vec3 shares = translucent ? (image ? vec3(0.5, 0.5, 0.0) : vec3(0.0, 1.0, 0.0))
             : (image ? vec3(0.5, 0.25, 0.25) : vec3(0.0, 0.5, 0.5));
         uint key = pixel_key(view.seed, pixel_position(view, index));
+        uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
         for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
             vec3 direction;
             float distance = 1e30;
             vec3 light = vec3(0.0);
-            bool environment_ray = k >= view.light_count;
-            if (!environment_ray) {
+            bool direction_ray = k >= first_direction;
+            EmitterPoint point;
+            point.triangle = MISS;
+            if (k < view.light_count) {
                 Incoming incoming = delta_light(k, s.position);
                 direction = incoming.direction;
                 distance = incoming.distance;
                 light = incoming.irradiance;
+            } else if (EMISSIVE != 0 && !direction_ray) {
+                vec2 u = random_point(key, step_.sample_index % BATCHES, DIM_EMITTER_REFLECT,
+                    step_.sample_index / BATCHES * view.directions + k - view.light_count);
+                point = draw_emitter(view, s.position, offset, u);
+                direction = point.direction;
+                distance = point.distance * EMITTER_REACH;
+                light = emitted(point.triangle, point.barycentric, direction);
             } else {
-                uint j = k - view.light_count;
+                uint j = k - first_direction;
                 vec2 u = random_point(key, step_.sample_index % BATCHES, DIM_REFLECT,
                     step_.sample_index / BATCHES * view.directions + j);
                 if (mirror) {
@@ -107,18 +118,40 @@ void main() {
             }
             vec3 wi = direction * frame;
             bool open = dot(s.normal, direction) > 0.0 && wi.z > 0.0;
+            // What is left of light from this direction, and the density of the directions that are drawn.
+            vec3 weight = vec3(0.0);
+            float density = 0.0;
             if (mirror) {
-                light *= environment_ray && k == view.light_count ? fresnel(m.ior, wo.z) : 0.0;
+                weight = vec3(k == first_direction ? fresnel(m.ior, wo.z) : 0.0);
+                light *= weight;
             } else if (open) {
-                light *= reflected(m, translucent, alpha, wo, wi);
-                if (environment_ray) {
-                    float density = shares.y * visible_normal_density(alpha, wo, wi) + shares.z * wi.z / PI;
+                weight = reflected(m, translucent, alpha, wo, wi);
+                light *= weight;
+                if (k >= view.light_count) {
+                    density = shares.y * visible_normal_density(alpha, wo, wi) + shares.z * wi.z / PI;
                     if (image) density += shares.x * environment_density(view, direction);
-                    light = density > 0.0 ? light / (density * float(view.directions)) : vec3(0.0);
+                }
+                if (direction_ray) light = density > 0.0 ? light / (density * float(view.directions)) : vec3(0.0);
+                weight /= float(view.directions);
+                if (EMISSIVE != 0 && point.triangle != MISS) {
+                    light = combined(light, point.density, point.distance, point.triangle, direction, density)
+                        / float(view.directions);
                 }
             }
-            open = open && light.x + light.y + light.z > 0.0;
-            traverse(Ray(s.position, offset, direction, 0.0, open ? distance : -1.0), ANY, EVERY_SET, 0u);
+            vec3 at_stake = EMISSIVE != 0 && direction_ray ? weight : light;
+            open = open && at_stake.x + at_stake.y + at_stake.z > 0.0;
+            traverse(Ray(s.position, offset, direction, 0.0, open ? distance : -1.0), EMISSIVE != 0 ? CLOSEST : ANY,
+                EVERY_SET, 0u);
+            if (EMISSIVE != 0 && open && hit_count != 0u) {
+                uint found = hit_triangle[0];
+                if (direction_ray) {
+                    vec3 emission = emitted(found, hit_barycentric, direction);
+                    // Only a mirror's own direction shows it what emits.
+                    light = weight * (mirror ? emission
+                        : combined(emission, emitter_density(view, found), hit_t[0], found, direction, density));
+                }
+                if (direction_ray || found == point.triangle) hit_count = 0u;
+            }
             if (open && hit_count == 0u) radiance += light;
         }
         if (step_.first != 0) radiance += m.emission;

@@ -18,6 +18,9 @@ const uint MAX_RAYS = 4u;
 // roundings of a position. Creases narrower than this are lit as if
 // open. `reflect`, which also sees what lies far outside the unit ball, scales it with the triangle's extent there.
 const float SHADOW_OFFSET = 3.8146973e-6;
+// Part of the way to a point of an emitter that must be free: what stands between the rest, 4e-6 of the distance, and
+// another triangle of the emitter that rounding puts there, casts no shadow.
+const float EMITTER_REACH = 0.9999962;
 // Least GGX width of an opaque material, which has no mirror.
 const float OPAQUE_ALPHA_MIN = 0.001;
 // Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
@@ -50,6 +53,9 @@ const uint ENVIRONMENT_IMAGE = 2u;
 const uint TRANSLUCENT = 1u;
 // Material flag: the directional dipole is averaged with itself, light and eye exchanged.
 const uint RECIPROCAL = 256u;
+// Material flag: the surface's emission lights both sides, not only the one from which its vertices run
+// counter-clockwise.
+const uint TWO_SIDED = 2u;
 // Light kind: position and intensity [W/sr].
 const uint LIGHT_POINT = 0u;
 // Light kind: a point light with a cone.
@@ -102,6 +108,10 @@ const uint DIM_LIGHT = 7u;
 const uint DIM_REFLECT = 9u;
 // Dimension of the hash that keeps hits beyond MAX_HITS.
 const uint DIM_OVERFLOW = 11u;
+// Dimensions 12 and 13: point of an emitter for the exit (a point per direction).
+const uint DIM_EMITTER = 12u;
+// Dimensions 14 and 15: point of an emitter for the first surface (a point per direction).
+const uint DIM_EMITTER_REFLECT = 14u;
 
 // One of PROJECTION_*.
 layout(constant_id = 1) const uint PROJECTION = 0;
@@ -111,6 +121,8 @@ layout(constant_id = 2) const uint ENVIRONMENT_KIND = 0;
 layout(constant_id = 3) const uint BATCHED = 0;
 // 1 to count traversal steps (tests and benchmarks).
 layout(constant_id = 4) const uint COUNT_STEPS = 0;
+// 1 where triangles emit light.
+layout(constant_id = 6) const uint EMISSIVE = 0;
 // Bit k is set where a material has a texture of kind k (TEXTURE_*).
 layout(constant_id = 7) const uint TEXTURED = 0;
 // Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
@@ -144,6 +156,8 @@ struct View {
     uint directions;
     // Delta lights in the scene.
     uint light_count;
+    // Triangles that emit light.
+    uint emitter_count;
     // 1 to add the environment where a camera ray hits nothing.
     uint show_environment;
     // Constant radiance, or the factor on the image's.
@@ -170,7 +184,7 @@ struct Step {
     uint sample_index;
     // 1 to trace `primary` through the pixel's centre, for the AOVs.
     uint pixel_centre;
-    // First shadow ray of this dispatch: delta lights first, then environment directions.
+    // First shadow ray of this dispatch: delta lights first, then points of emitters, then directions.
     uint ray_begin;
     // Shadow rays of this dispatch; 0 where the scene has no light.
     uint ray_count;
@@ -250,7 +264,7 @@ struct Material {
     float metallic;
     // Emitted radiance.
     vec3 emission;
-    // TRANSLUCENT, RECIPROCAL or nothing.
+    // Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
     uint flags;
     // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
     uint ramp;
@@ -305,6 +319,13 @@ struct Light {
     float spot_offset;
     // KHR_lights_punctual range: factor max(1 - (d * inverse_range)^4, 0); 0 is infinite range.
     float inverse_range;
+};
+
+// A triangle that emits light.
+struct Emitter {
+    uint triangle;
+    // Probability that a point is drawn on it, over its area.
+    float density;
 };
 
 // The surface a camera ray meets first (the G-buffer), written by `primary`.
@@ -394,6 +415,10 @@ struct Pixel {
 #define PIXELS(access) layout(set = 0, binding = 13, scalar) access buffer PixelsBlock { Pixel pixels[]; }
 // Largest number of traversal steps of any invocation, by atomicMax.
 #define COUNTERS(access) layout(set = 0, binding = 14, scalar) access buffer CountersBlock { uint counters[]; }
+// Emissive triangles, by rising index.
+#define EMITTERS(access) layout(set = 0, binding = 15, scalar) access buffer EmittersBlock { Emitter emitters[]; }
+// Cumulative probability of the emitters, emitter_count + 1 multiples of 2^-24 from 0 to 1.
+#define EMITTER_CDF(access) layout(set = 0, binding = 16, scalar) access buffer EmitterCdfBlock { float emitter_cdf[]; }
 // 256 numbers, the decoding of sRGB bytes; then the texels of all textures, red in the lowest byte, alpha in the highest.
 #define TEXELS(access) layout(set = 0, binding = 17, scalar) access buffer TexelsBlock { uint texels[]; }
 // TEXTURE_KINDS entries for each material.

@@ -4,14 +4,14 @@ use crate::{
     error::{Error, Result},
     model,
     reference::{
-        Inputs, light,
+        Inputs, emitter, light,
         profile::{self, Coefficients},
     },
     scene::{Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene},
     settings::{Projection, Settings},
-    shared::{self, Features, Light, Material, TRANSLUCENT, Texture, View},
+    shared::{self, Emitter, Features, Light, Material, TRANSLUCENT, TWO_SIDED, Texture, View},
 };
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// Everything that kernels read and that a scene and its settings determine, but for the geometry.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub struct Prepared {
     pub view: View,
     pub materials: Vec<Material>,
     pub lights: Vec<Light>,
+    pub emitters: Vec<Emitter>,
+    pub emitter_cdf: Vec<f32>,
     pub environment: Vec<Vec3>,
     pub environment_cdf: Vec<f32>,
     /// Texels and textures as their slots hold them; none without textures.
@@ -34,7 +36,8 @@ pub struct Prepared {
     /// Whether light can leave a first surface without having entered it, or the environment is shown: otherwise
     /// `reflect` does not run.
     pub has_reflection: bool,
-    /// Shadow rays of one position: delta lights, then environment directions.
+    /// Shadow rays of one position: one for each delta light, N to points of emitters if there are any, N directions if
+    /// there is an environment or an emitter.
     pub ray_count: u32,
 }
 
@@ -48,6 +51,8 @@ impl Prepared {
             shadings: &scene.shadings,
             materials: &self.materials,
             lights: &self.lights,
+            emitters: &self.emitters,
+            emitter_cdf: &self.emitter_cdf,
             environment: &self.environment,
             environment_cdf: &self.environment_cdf,
             texels: &self.texels,
@@ -108,6 +113,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let materials = scene.materials.iter().map(|m| material(m, scene.frame, settings)).collect::<Result<Vec<_>>>()?;
     let frame = scene.frame;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
+    let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
     let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
 
     let mut view = view_of(&camera, frame, width, height);
@@ -116,6 +122,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     view.seed = settings.seed;
     view.directions = settings.directions;
     view.light_count = lights.len() as u32;
+    view.emitter_count = emitters.len() as u32;
     view.show_environment = u32::from(settings.show_environment);
 
     let map = &scene.environment;
@@ -145,19 +152,20 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     }
 
     let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_some() == flag);
-    let emits = scene.materials.iter().any(|m| m.emission != DVec3::ZERO);
     let rough = scene.materials.iter().any(|m| m.roughness > 0.0);
     let translucent = materials.iter().filter(|material| material.flags & TRANSLUCENT != 0);
     let models = translucent.fold(0, |mask, material| mask | 1 << material.model);
+    let emits = !emitters.is_empty();
+    let features = Features {
+        projection: settings.projection as u32,
+        environment: kind,
+        batches: u32::from(settings.variance),
+        models,
+        emitters: u32::from(emits),
+        ..Features::default()
+    };
     Ok(Prepared {
-        features: Features {
-            projection: settings.projection as u32,
-            environment: kind,
-            batches: u32::from(settings.variance),
-            counters: 0,
-            textures: 0,
-            models,
-        },
+        features,
         view,
         materials,
         has_translucent: used(true),
@@ -166,8 +174,10 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
             || settings.show_environment
             || kind != shared::ENVIRONMENT_NONE
             || !lights.is_empty() && rough,
-        ray_count: lights.len() as u32 + if kind == shared::ENVIRONMENT_NONE { 0 } else { settings.directions },
+        ray_count: features.rays(&view),
         lights,
+        emitters,
+        emitter_cdf,
         environment,
         environment_cdf,
         texels: vec![],
@@ -264,5 +274,8 @@ fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings
     out.base_color = material.base_color.as_vec3();
     out.metallic = material.metallic as f32;
     out.emission = material.emission.as_vec3();
+    if material.two_sided {
+        out.flags |= TWO_SIDED;
+    }
     Ok(out)
 }

@@ -182,6 +182,9 @@ constants! {
     /// roundings of a position. Creases narrower than this are lit as if
     /// open. `reflect`, which also sees what lies far outside the unit ball, scales it with the triangle's extent there.
     SHADOW_OFFSET: f32 = 3.814_697_3e-6;
+    /// Part of the way to a point of an emitter that must be free: what stands between the rest, 4e-6 of the distance, and
+    /// another triangle of the emitter that rounding puts there, casts no shadow.
+    EMITTER_REACH: f32 = 0.999_996_2;
     /// Least GGX width of an opaque material, which has no mirror.
     OPAQUE_ALPHA_MIN: f32 = 1e-3;
     /// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
@@ -218,6 +221,9 @@ constants! {
     TRANSLUCENT: u32 = 1;
     /// Material flag: the directional dipole is averaged with itself, light and eye exchanged.
     RECIPROCAL: u32 = 256;
+    /// Material flag: the surface's emission lights both sides, not only the one from which its vertices run
+    /// counter-clockwise.
+    TWO_SIDED: u32 = 2;
 
     /// Light kind: position and intensity [W/sr].
     LIGHT_POINT: u32 = 0;
@@ -273,6 +279,10 @@ constants! {
     DIM_REFLECT: u32 = 9;
     /// Dimension of the hash that keeps hits beyond MAX_HITS.
     DIM_OVERFLOW: u32 = 11;
+    /// Dimensions 12 and 13: point of an emitter for the exit (a point per direction).
+    DIM_EMITTER: u32 = 12;
+    /// Dimensions 14 and 15: point of an emitter for the first surface (a point per direction).
+    DIM_EMITTER_REFLECT: u32 = 14;
 }
 
 structs! {
@@ -304,6 +314,8 @@ structs! {
         directions: u32,
         /// Delta lights in the scene.
         light_count: u32,
+        /// Triangles that emit light.
+        emitter_count: u32,
         /// 1 to add the environment where a camera ray hits nothing.
         show_environment: u32,
         /// Constant radiance, or the factor on the image's.
@@ -330,7 +342,7 @@ structs! {
         sample_index: u32,
         /// 1 to trace `primary` through the pixel's centre, for the AOVs.
         pixel_centre: u32,
-        /// First shadow ray of this dispatch: delta lights first, then environment directions.
+        /// First shadow ray of this dispatch: delta lights first, then points of emitters, then directions.
         ray_begin: u32,
         /// Shadow rays of this dispatch; 0 where the scene has no light.
         ray_count: u32,
@@ -410,7 +422,7 @@ structs! {
         metallic: f32,
         /// Emitted radiance.
         emission: Vec3,
-        /// TRANSLUCENT, RECIPROCAL or nothing.
+        /// Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
         flags: u32,
         /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
         ramp: u32,
@@ -465,6 +477,13 @@ structs! {
         spot_offset: f32,
         /// KHR_lights_punctual range: factor max(1 - (d * inverse_range)^4, 0); 0 is infinite range.
         inverse_range: f32,
+    }
+
+    /// A triangle that emits light.
+    struct Emitter {
+        triangle: u32,
+        /// Probability that a point is drawn on it, over its area.
+        density: f32,
     }
 
     /// The surface a camera ray meets first (the G-buffer), written by `primary`.
@@ -556,6 +575,10 @@ buffers! {
     Pixels = 13: PIXELS [Pixel] pixels;
     /// Largest number of traversal steps of any invocation, by atomicMax.
     Counters = 14: COUNTERS [u32] counters;
+    /// Emissive triangles, by rising index.
+    Emitters = 15: EMITTERS [Emitter] emitters;
+    /// Cumulative probability of the emitters, emitter_count + 1 multiples of 2^-24 from 0 to 1.
+    EmitterCdf = 16: EMITTER_CDF [f32] emitter_cdf;
     /// 256 numbers, the decoding of sRGB bytes; then the texels of all textures, red in the lowest byte, alpha in the highest.
     Texels = 17: TEXELS [u32] texels;
     /// TEXTURE_KINDS entries for each material.
@@ -573,10 +596,26 @@ features! {
     batches = 3: BATCHED,
     /// 1 to count traversal steps (tests and benchmarks).
     counters = 4: COUNT_STEPS,
+    /// 1 where triangles emit light.
+    emitters = 6: EMISSIVE,
     /// Bit k is set where a material has a texture of kind k (TEXTURE_*).
     textures = 7: TEXTURED,
     /// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
     models = 5: MODELS,
+}
+
+impl Features {
+    /// Shadow rays of a sample: one for each delta light, N to points of emitters if there are any, and N in directions
+    /// from which an environment or an emitter may shine.
+    pub fn rays(&self, view: &View) -> u32 {
+        let directions = self.environment != ENVIRONMENT_NONE || self.emitters != 0;
+        self.first_direction(view) + u32::from(directions) * view.directions
+    }
+
+    /// The first of those rays that is a direction.
+    pub fn first_direction(&self, view: &View) -> u32 {
+        view.light_count + self.emitters * view.directions
+    }
 }
 
 /// The text of `glsl/shared.glsl`.

@@ -95,7 +95,9 @@ impl SceneOptions {
                 "no surface is translucent: give a material a preset with --material; there are: {names}"
             ));
         }
-        if environment.is_none() && scene.lights.is_empty() && scene.environment.map == EnvironmentMap::None {
+        let emits = scene.materials.iter().any(|material| material.emission != DVec3::ZERO);
+        let dark = scene.lights.is_empty() && !emits && scene.environment.map == EnvironmentMap::None;
+        if environment.is_none() && dark {
             warnings.push(
                 "no light in the scene and no --environment: a constant environment of radiance 1 is used".into(),
             );

@@ -27,15 +27,15 @@ use super::projection::{Seen, geometric_normal, inverse_scale, matter_at, mixtur
 use super::random::{batch, key, scramble, sobol, unit};
 use super::sample::coordinate;
 use super::sums::Contribution;
-use super::{Inputs, intersect, texture};
+use super::{Inputs, emitter, intersect, texture};
 use crate::shared::{
-    BATCHES, DIM_HIT, DIM_LIGHT, ENVIRONMENT_CONSTANT, Hits, MAX_HITS, PROJECTION_CAMERA, Probe, SHADOW_OFFSET, Step,
-    Surface, TEXTURE_BASE_COLOR, Triangle,
+    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, PROJECTION_CAMERA,
+    Probe, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// Environment coordinates of direction `j` of the step's sample.
+/// Coordinates of direction or emitter's point `j` of the step's sample.
 pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, dimension: u32) -> (f64, f64) {
     let (px, py) = position(inputs.view, step, index);
     let number = (step.sample_index / BATCHES).wrapping_mul(inputs.view.directions).wrapping_add(j);
@@ -46,10 +46,34 @@ pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, 
     (coordinate(0), coordinate(1))
 }
 
-/// 1 if nothing is between a point and `distance` along `wi`, else 0. `normal` is the geometric one.
-pub(super) fn visibility(inputs: &Inputs, point: DVec3, normal: DVec3, wi: DVec3, distance: f64) -> f64 {
-    let origin = point + normal * f64::from(SHADOW_OFFSET);
+/// Where shadow rays of a point begin. `normal` is the geometric one.
+pub(super) fn lifted(point: DVec3, normal: DVec3) -> DVec3 {
+    point + normal * f64::from(SHADOW_OFFSET)
+}
+
+/// 1 if nothing is between `origin` and `distance` along `wi`, else 0.
+pub(super) fn visibility(inputs: &Inputs, origin: DVec3, wi: DVec3, distance: f64) -> f64 {
     if intersect::any(inputs, origin, wi, 0.0, distance) { 0.0 } else { 1.0 }
+}
+
+/// Light of a point of an emitter over both densities; `pdf` is that of the directions. 0 where it is hidden.
+pub(super) fn from_emitter(inputs: &Inputs, origin: DVec3, point: &emitter::Point, pdf: f64) -> DVec3 {
+    let reach = point.distance * f64::from(EMITTER_REACH);
+    let hit = intersect::closest(inputs, origin, point.wi, 0.0, reach);
+    let hidden = hit.is_some_and(|hit| hit.triangle != point.triangle);
+    // A point seen along its own surface has no solid angle.
+    if hidden || !point.density.is_finite() { DVec3::ZERO } else { point.radiance / (point.density + pdf) }
+}
+
+/// Light from the direction `wi` over its density: an emitter's or the environment's, which counts over `pdf` alone.
+pub(super) fn from_direction(inputs: &Inputs, origin: DVec3, wi: DVec3, pdf: f64) -> DVec3 {
+    if inputs.features.emitters != 0
+        && let Some(hit) = intersect::closest(inputs, origin, wi, 0.0, FAR)
+    {
+        let radiance = emitter::radiance(inputs, hit.triangle, hit.barycentric, wi);
+        return radiance / (emitter::density(inputs, hit.triangle, wi, hit.t) + pdf);
+    }
+    light::environment(inputs, wi) / pdf * visibility(inputs, origin, wi, FAR)
 }
 
 /// The contribution of the step's rays to pixel `index` of the band.
@@ -172,38 +196,52 @@ impl Entry {
 
 /// E: the light of the step's rays that enters.
 fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry) -> DVec3 {
+    let origin = lifted(entry.point, entry.normal);
+    let first_direction = inputs.features.first_direction(inputs.view);
+    let directions = f64::from(inputs.view.directions);
     let ray = |k: u32| -> DVec3 {
-        let (wi, irradiance, distance) = if let Some(light) = inputs.lights.get(k as usize) {
-            let incident = light::delta(light, entry.point);
-            (incident.wi, incident.irradiance, incident.distance)
-        } else {
-            let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_LIGHT);
-            let (wi, pdf) = environment_direction(inputs, entry.shading, u1, u2);
-            (wi, light::environment(inputs, wi) / (pdf * f64::from(inputs.view.directions)), FAR)
+        // Most rays need not be traced.
+        let entering = |wi: DVec3, light: &dyn Fn() -> DVec3| {
+            let transmission = entry.transmission(wi);
+            if transmission > 0.0 { transmission * light() } else { DVec3::ZERO }
         };
-        let transmission = entry.transmission(wi);
-        if transmission > 0.0 {
-            transmission * irradiance * visibility(inputs, entry.point, entry.normal, wi, distance)
-        } else {
-            DVec3::ZERO
+        if let Some(light) = inputs.lights.get(k as usize) {
+            let incident = light::delta(light, entry.point);
+            let visible = || visibility(inputs, origin, incident.wi, incident.distance);
+            return entering(incident.wi, &|| incident.irradiance * visible());
         }
+        if k < first_direction {
+            let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_EMITTER);
+            let point = emitter::draw(inputs, origin, u1, u2);
+            let pdf = direction_pdf(inputs, entry.shading, point.wi);
+            return entering(point.wi, &|| from_emitter(inputs, origin, &point, pdf) / directions);
+        }
+        let (u1, u2) = direction_point(inputs, step, index, k - first_direction, DIM_LIGHT);
+        let wi = direction(inputs, entry.shading, u1, u2);
+        let pdf = direction_pdf(inputs, entry.shading, wi);
+        entering(wi, &|| from_direction(inputs, origin, wi, pdf) / directions)
     };
     (step.ray_begin..step.ray_begin + step.ray_count).map(ray).sum()
 }
 
-/// A direction towards the environment, and its density: cosine-weighted, or half of that and half of the image's.
-fn environment_direction(inputs: &Inputs, normal: DVec3, u1: f64, u2: f64) -> (DVec3, f64) {
-    let cosine_pdf = |wi: DVec3| normal.dot(wi).max(0.0) / PI;
-    if inputs.features.environment == ENVIRONMENT_CONSTANT {
-        let wi = cosine_direction(normal, u1, u2);
-        return (wi, cosine_pdf(wi));
-    }
-    let wi = if u1 < 0.5 {
+/// A direction from which light may come: cosine-weighted, or half of that and half of the environment image's.
+fn direction(inputs: &Inputs, normal: DVec3, u1: f64, u2: f64) -> DVec3 {
+    if inputs.features.environment != ENVIRONMENT_IMAGE {
+        cosine_direction(normal, u1, u2)
+    } else if u1 < 0.5 {
         light::sample_environment(inputs, 2.0 * u1, u2)
     } else {
         cosine_direction(normal, 2.0 * u1 - 1.0, u2)
-    };
-    (wi, 0.5 * light::environment_pdf(inputs, wi) + 0.5 * cosine_pdf(wi))
+    }
+}
+
+/// The density of [`direction`].
+fn direction_pdf(inputs: &Inputs, normal: DVec3, wi: DVec3) -> f64 {
+    let cosine = normal.dot(wi).max(0.0) / PI;
+    if inputs.features.environment != ENVIRONMENT_IMAGE {
+        return cosine;
+    }
+    0.5 * light::environment_pdf(inputs, wi) + 0.5 * cosine
 }
 
 /// Weights of the second and third vertex of a point in the plane of a triangle.

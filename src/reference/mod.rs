@@ -7,6 +7,7 @@
 pub mod accumulate;
 pub mod area;
 pub mod boundary;
+pub mod emitter;
 pub mod intersect;
 pub mod light;
 pub mod math;
@@ -24,8 +25,8 @@ pub mod texture;
 pub mod walk;
 
 use crate::shared::{
-    BATCHES, Coordinates, ENVIRONMENT_NONE, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Texture,
-    Triangle, View,
+    BATCHES, Coordinates, Emitter, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Texture, Triangle,
+    View,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -41,6 +42,9 @@ pub struct Inputs<'a> {
     pub shadings: &'a [Shading],
     pub materials: &'a [Material],
     pub lights: &'a [Light],
+    /// Triangles that emit light, and the table from which they are drawn; see [`emitter`].
+    pub emitters: &'a [Emitter],
+    pub emitter_cdf: &'a [f32],
     /// Texels of the environment image, empty if there is none.
     pub environment: &'a [Vec3],
     /// Its sampling table; see [`Slot::EnvironmentCdf`](crate::shared::Slot::EnvironmentCdf).
@@ -53,21 +57,13 @@ pub struct Inputs<'a> {
     pub profiles: &'a [f32],
 }
 
-impl Inputs<'_> {
-    /// Shadow rays of a sample: one for each delta light, N for the environment.
-    pub fn rays(&self) -> u32 {
-        let directions = if self.features.environment == ENVIRONMENT_NONE { 0 } else { self.view.directions };
-        self.view.light_count + directions
-    }
-}
-
 /// The step of one sample that traces all its rays in one dispatch.
 pub fn step(inputs: &Inputs, sample_index: u32, rows: Range<u32>, samples: Range<u32>) -> Step {
     Step {
         first_row: rows.start,
         pixel_count: rows.len() as u32 * inputs.view.crop_width,
         sample_index,
-        ray_count: inputs.rays(),
+        ray_count: inputs.features.rays(inputs.view),
         first: 1,
         count: 1,
         range_begin: samples.start,

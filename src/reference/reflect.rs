@@ -4,18 +4,21 @@
 //! the environment alone. Opaque matter is the metallic-roughness model of glTF 2.0, appendix B: the same lobe with
 //! Schlick's F from F0 = mix(((n-1)/(n+1))^2, colour, metallic), over (1 - F)(1 - metallic) colour / pi.
 //!
-//! Environment directions come from several densities, chosen by an interval of u1 and combined by the balance
-//! heuristic: visible normals, the cosine (opaque matter), the image.
+//! Directions come from several densities, chosen by an interval of u1 and combined by the balance heuristic: visible
+//! normals, the cosine (opaque matter), the environment's image. What emits is also found by points drawn on it; see
+//! [`emitter`](super::emitter).
 
-use super::accumulate::{direction_point, visibility};
+use super::accumulate::{direction_point, from_direction, from_emitter, lifted, visibility};
 use super::boundary::{ggx, schlick, smith_g2, visible_normal, visible_normal_pdf};
 use super::light::{self, FAR};
 use super::math::{basis, cosine_direction, from_local};
 use super::primary::camera_ray;
 use super::projection::{Seen, material, seen};
 use super::sums::Contribution;
-use super::{Inputs, boundary, texture};
-use crate::shared::{DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Surface, TRANSLUCENT};
+use super::{Inputs, boundary, emitter, intersect, texture};
+use crate::shared::{
+    DIM_EMITTER_REFLECT, DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Surface, TRANSLUCENT,
+};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -42,8 +45,8 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
     // Positions round as the vertices do, and opaque surfaces may reach far beyond the unit ball.
     let triangle = &inputs.triangles[surface.triangle as usize];
     let extent = triangle.corner.abs().max(triangle.edge1.abs()).max(triangle.edge2.abs()).max_element().max(1.0);
-    let lift = seen.normal * f64::from(extent);
-    let visible = |wi: DVec3, distance: f64| visibility(inputs, point, lift, wi, distance);
+    let origin = lifted(point, seen.normal * f64::from(extent));
+    let directions = f64::from(inputs.view.directions);
 
     if let Some(light) = inputs.lights.get(k as usize) {
         let incident = light::delta(light, point);
@@ -51,25 +54,41 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
         if lobe.is_mirror() || cosine <= 0.0 {
             return DVec3::ZERO;
         }
-        return lobe.scattering(incident.wi) * cosine * incident.irradiance * visible(incident.wi, incident.distance);
+        let visible = visibility(inputs, origin, incident.wi, incident.distance);
+        return lobe.scattering(incident.wi) * cosine * incident.irradiance * visible;
     }
-    let j = k - inputs.view.light_count;
+    let first_direction = inputs.features.first_direction(inputs.view);
+    if k < first_direction {
+        let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_EMITTER_REFLECT);
+        let drawn = emitter::draw(inputs, origin, u1, u2);
+        let cosine = cosine(drawn.wi);
+        if lobe.is_mirror() || cosine <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let light = from_emitter(inputs, origin, &drawn, lobe.direction_pdf(inputs, drawn.wi));
+        return lobe.scattering(drawn.wi) * cosine * light / directions;
+    }
+    let j = k - first_direction;
     if lobe.is_mirror() {
         let wi = 2.0 * lobe.cos_o * lobe.normal - lobe.wo;
         if j > 0 || cosine(wi) <= 0.0 {
             return DVec3::ZERO;
         }
         let reflectance = fresnel_outside(lobe.material.ior.into(), lobe.cos_o);
-        return reflectance * light::environment(inputs, wi) * visible(wi, FAR);
+        let arriving = match intersect::closest(inputs, origin, wi, 0.0, FAR) {
+            Some(hit) => emitter::radiance(inputs, hit.triangle, hit.barycentric, wi),
+            None => light::environment(inputs, wi),
+        };
+        return reflectance * arriving;
     }
     let (u1, u2) = direction_point(inputs, step, index, j, DIM_REFLECT);
-    let (wi, pdf) = lobe.environment_direction(inputs, u1, u2);
+    let wi = lobe.direction(inputs, u1, u2);
+    let pdf = lobe.direction_pdf(inputs, wi);
     let cosine = cosine(wi);
     if cosine <= 0.0 || pdf <= 0.0 {
         return DVec3::ZERO;
     }
-    let weight = cosine / (pdf * f64::from(inputs.view.directions));
-    lobe.scattering(wi) * light::environment(inputs, wi) * weight * visible(wi, FAR)
+    lobe.scattering(wi) * cosine * from_direction(inputs, origin, wi, pdf) / directions
 }
 
 fn fresnel_outside(ior: f64, cos: f64) -> f64 {
@@ -128,25 +147,34 @@ impl<'a> Lobe<'a> {
         2.0 * self.wo.dot(half) * half - self.wo
     }
 
-    /// A direction towards the environment and its density.
-    fn environment_direction(&self, inputs: &Inputs, u1: f64, u2: f64) -> (DVec3, f64) {
-        // Shares of image, visible normals and cosine, in the order of the intervals of u1.
+    /// Shares of image, visible normals and cosine, in the order of the intervals of u1.
+    fn shares(&self, inputs: &Inputs) -> [f64; 3] {
         let image = if inputs.features.environment == ENVIRONMENT_IMAGE { 0.5 } else { 0.0 };
         let cosine = if self.translucent { 0.0 } else { (1.0 - image) / 2.0 };
-        let visible = 1.0 - image - cosine;
-        let wi = if u1 < image {
+        [image, 1.0 - image - cosine, cosine]
+    }
+
+    /// A direction from which light may come.
+    fn direction(&self, inputs: &Inputs, u1: f64, u2: f64) -> DVec3 {
+        let [image, visible, cosine] = self.shares(inputs);
+        if u1 < image {
             light::sample_environment(inputs, u1 / image, u2)
         } else if u1 < image + visible {
             self.visible_normal_direction((u1 - image) / visible, u2)
         } else {
             cosine_direction(self.normal, (u1 - image - visible) / cosine, u2)
-        };
+        }
+    }
+
+    /// The density of [`Lobe::direction`].
+    fn direction_pdf(&self, inputs: &Inputs, wi: DVec3) -> f64 {
+        let [image, visible, cosine] = self.shares(inputs);
         let half = (self.wo + wi).normalize();
         let mut pdf = visible * visible_normal_pdf(self.alpha, self.cos_o, self.normal.dot(half))
             + cosine * self.normal.dot(wi).max(0.0) / PI;
         if image > 0.0 {
             pdf += image * light::environment_pdf(inputs, wi);
         }
-        (wi, pdf)
+        pdf
     }
 }

@@ -36,6 +36,7 @@ pub(super) fn hash(scene: &Scene) -> String {
         feed.numbers(material.base_color.to_array());
         feed.numbers([material.metallic, material.roughness, material.ior]);
         feed.numbers(material.emission.to_array());
+        feed.count(usize::from(material.two_sided));
         feed.count(usize::from(material.medium.is_some()));
         if let Some(medium) = &material.medium {
             feed.numbers(medium.sigma_s_prime.to_array());

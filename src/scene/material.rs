@@ -62,6 +62,7 @@ pub(super) fn default_material() -> Material {
         metallic: 1.0,
         roughness: 1.0,
         emission: DVec3::ZERO,
+        two_sided: false,
         ior: DEFAULT_IOR,
         medium: None,
         set: None,
@@ -171,9 +172,7 @@ fn read_surface(item: &Item, material: &mut Material, warnings: &mut Vec<String>
     {
         material.emission *= strength.within(0.0, INTENSITY_MAX)?;
     }
-    if material.emission != DVec3::ZERO {
-        warnings.push(item.note("emits light that is seen, but that does not yet light other surfaces"));
-    }
+    material.two_sided = item.get("doubleSided")?.map_or(Ok(false), |sides| sides.boolean())?;
     if let Some(mode) = item.get("alphaMode")? {
         match mode.string()? {
             "OPAQUE" => {}

@@ -188,6 +188,8 @@ pub struct Material {
     pub roughness: f64,
     /// Emitted radiance, >= 0.
     pub emission: DVec3,
+    /// glTF's `doubleSided`: emission lights both sides. The camera sees both sides of everything.
+    pub two_sided: bool,
     /// Index of refraction, inside over outside, > 0.
     pub ior: f64,
     /// What fills it; none for an opaque material.

@@ -60,6 +60,8 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         shadings: &[],
         materials: &[],
         lights: &[],
+        emitters: &[],
+        emitter_cdf: &[],
         environment: &[],
         environment_cdf: &[],
         texels: &[],

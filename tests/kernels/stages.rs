@@ -37,7 +37,22 @@ fn cases() -> Vec<(String, Case)> {
         rotation: 40.0,
         scale: 0.3,
     };
+    // The animal and what it stands on shine.
+    let mut shining = demo.clone();
+    for (index, material) in shining.materials.iter_mut().enumerate() {
+        material.emission = DVec3::new(0.3, 0.2, 0.1) * (1 + 3 * index) as f64;
+        material.two_sided = index == 0;
+    }
     let mut cases = vec![];
+    for environment in [None, Some(&image)] {
+        let mut scene = shining.clone();
+        scene.lights.truncate(1);
+        if let Some(environment) = environment {
+            scene.set_environment(environment.clone()).expect("the environment is valid");
+        }
+        let settings = Settings { resolution: Some(FULL), crop: Some(CROP), seed: 3, ..Settings::default() };
+        cases.push((format!("emitters, {}", scene.lights.len()), Case::new(scene, &settings)));
+    }
     for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
         for (name, environment) in [("delta", None), ("constant", Some(&constant)), ("image", Some(&image))] {
             let mut scene = demo.clone();

@@ -286,7 +286,6 @@ fn warnings_name_what_is_left_out() {
         (json!({"pbrMetallicRoughness": {"baseColorTexture": texture}}), "materials[0] (matter): textures"),
         (json!({"normalTexture": texture}), "textures are not modelled"),
         (json!({"alphaMode": "BLEND"}), "materials[0] (matter).alphaMode: transparency by alpha"),
-        (json!({"emissiveFactor": [1, 1, 1]}), "emits light that is seen"),
         (json!({"extensions": {"KHR_materials_ior": {"ior": 0}}}), "0 (a full reflector"),
         (json!({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}), "refraction through clear"),
         (json!({"extensions": {"KHR_materials_clearcoat": {}}}), "clear coat (KHR_materials_clearcoat)"),

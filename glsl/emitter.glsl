@@ -1,0 +1,66 @@
+// Emissive triangles as lights: draws of their points and the density of those. Included after SHADINGS. The mathematics
+// is in src/reference/emitter.rs.
+
+EMITTERS(readonly);
+EMITTER_CDF(readonly);
+
+// Radiance that a triangle sends against the unit vector `direction`, at the weights of its second and third vertex.
+vec3 emitted(uint triangle, vec2 barycentric, vec3 direction) {
+    Material m = materials[shadings[triangle].material];
+    bool back = dot(cross(triangles[triangle].edge1, triangles[triangle].edge2), direction) > 0.0;
+    if (back && (m.flags & TWO_SIDED) == 0 || !solid(triangle, barycentric)) return vec3(0.0);
+    if (has_texture(TEXTURE_EMISSION)) m.emission *= texture_value(TEXTURE_EMISSION, triangle, barycentric).rgb;
+    return m.emission;
+}
+
+// Density per area with which points of a triangle are drawn; 0 where none is.
+float emitter_density(View view, uint triangle) {
+    uint low = 0u, high = view.emitter_count;
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (emitters[middle].triangle <= triangle)
+            low = middle;
+        else
+            high = middle;
+    }
+    return emitters[low].triangle == triangle ? emitters[low].density : 0.0;
+}
+
+// Radiance over the sum of two densities per solid angle: `directional`, and `density` per area at this distance.
+vec3 combined(vec3 radiance, float density, float distance, uint triangle, vec3 direction, float directional) {
+    float c = abs(dot(normalize(cross(triangles[triangle].edge1, triangles[triangle].edge2)), direction));
+    float sum = density * distance * distance + c * directional;
+    return sum > 0.0 ? radiance * (c / sum) : vec3(0.0);
+}
+
+// A point of an emitter as a position sees it.
+struct EmitterPoint {
+    vec3 direction;
+    float distance;
+    uint triangle;
+    vec2 barycentric;
+    float density;
+};
+
+EmitterPoint draw_emitter(View view, vec3 base, vec3 offset, vec2 u) {
+    uint low = 0u, high = view.emitter_count;
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (emitter_cdf[middle] <= u.x)
+            low = middle;
+        else
+            high = middle;
+    }
+    EmitterPoint point;
+    point.triangle = emitters[low].triangle;
+    point.density = emitters[low].density;
+    // u.x is a multiple of 2^-24, and so stands for the middle of an interval of that width.
+    float rest = ((u.x - emitter_cdf[low]) + 2.98023223876953125e-8) / (emitter_cdf[low + 1u] - emitter_cdf[low]);
+    float s = sqrt(rest);
+    point.barycentric = vec2(s - s * u.y, s * u.y);
+    Triangle triangle = triangles[point.triangle];
+    vec3 to = ((triangle.corner - base) - offset) + point.barycentric.x * triangle.edge1 + point.barycentric.y * triangle.edge2;
+    point.distance = length(to);
+    point.direction = to / point.distance;
+    return point;
+}
