@@ -61,6 +61,7 @@
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
+//! | [`measure`] | all of these | numeric experiments: kernels beside closed forms |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
 //! The extremes that renders survive, each with its test, are in [`extremes`].
@@ -73,6 +74,7 @@ pub mod extremes {}
 pub mod gpu;
 pub mod image;
 pub mod inspect;
+pub mod measure;
 pub mod model;
 pub mod prepare;
 pub mod reference;

@@ -3,7 +3,7 @@
 mod program;
 
 use clap::{Parser, Subcommand};
-use program::{inspect::Inspect, merge::Merge, render::Render, tables};
+use program::{inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables};
 use std::process::ExitCode;
 
 /// Renders translucent matter (marble, skin, milk, wax) in glTF scenes with Vulkan compute.
@@ -24,6 +24,8 @@ enum Command {
     Render(Box<Render>),
     /// Say what a scene requires: matter, models, lights, kernels, buffers, and why.
     Inspect(Box<Inspect>),
+    /// Measure on scenes with a known answer, and plot both.
+    Measure(Box<Measure>),
     /// Put the parts of a larger render together, weighted by samples.
     Merge(Merge),
     /// List every named material with its coefficients, mean free path and colour.
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(render) => render.run(),
         Command::Inspect(inspect) => inspect.run(),
+        Command::Measure(measure) => measure.run(),
         Command::Merge(merge) => merge.run(),
         Command::Presets => tables::presets(),
         Command::Devices => tables::devices(),

@@ -5,7 +5,7 @@ mod merge;
 mod png;
 mod whole;
 
-pub use whole::check_writable;
+pub use whole::{check_writable, write_whole};
 
 use crate::{Error, Result};
 use std::{collections::BTreeMap, path::Path};

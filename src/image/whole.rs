@@ -35,6 +35,15 @@ pub fn check_writable(path: impl AsRef<Path>) -> Result<()> {
     fs::remove_file(&temporary).map_err(|error| problem(error.to_string()))
 }
 
+/// Writes a file that appears whole or not at all.
+///
+/// # Errors
+/// [`Error::Setting`] for a path that no file can have, [`Error::File`] if it cannot be written; then there is no file, or
+/// the old one.
+pub fn write_whole(path: impl AsRef<Path>, content: &[u8]) -> Result<()> {
+    write(path.as_ref(), |mut file| io::Write::write_all(&mut file, content).map_err(|error| error.to_string()))
+}
+
 /// Lets `fill` write the content of `path`. If it fails, there is no file, or the old one.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&File) -> std::result::Result<(), String>) -> Result<()> {
     check_writable(path)?;

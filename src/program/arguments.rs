@@ -70,6 +70,18 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|value| *value >= 0.0).ok_or("it is a finite number of at least 0".into())
 }
 
+/// A finite number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|value| *value > 0.0).ok_or("it is a finite number above 0".into())
+}
+
+/// `R,G,B`, or one number for all.
+pub fn triple(text: &str) -> Result<[f64; 3], String> {
+    let one = finite(text).ok().map(|value| [value; 3]);
+    let three = list::<f64, 3>(text).filter(|values| values.iter().all(|value| value.is_finite()));
+    one.or(three).ok_or("it is R,G,B or one number for all".into())
+}
+
 fn list<T: std::str::FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
     let values: Option<Vec<T>> = text.split(',').map(|value| value.trim().parse().ok()).collect();
     values?.try_into().ok()

@@ -2,7 +2,9 @@
 
 pub mod arguments;
 pub mod inspect;
+pub mod measure;
 pub mod merge;
+pub mod plot;
 pub mod render;
 pub mod scene;
 pub mod tables;

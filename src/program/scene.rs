@@ -72,7 +72,7 @@ fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
     })
 }
 
-fn models() -> impl TypedValueParser<Value = Model> {
+pub fn models() -> impl TypedValueParser<Value = Model> {
     PossibleValuesParser::new(Model::NAMES.map(|(_, name)| name))
         .map(|name| name.parse().expect("the parser passes names alone"))
 }
