@@ -17,7 +17,7 @@ const SIZE: u32 = 64;
 /// Half the image's side, in radii.
 const VIEW: f64 = 1.02;
 /// Subdivisions of the octahedron.
-const SUBDIVISIONS: u32 = 96;
+const SUBDIVISIONS: u32 = 64;
 /// Radii over the mean free path of the green channel.
 const RADII: [f64; 6] = [0.5, 1.5, 5.0, 15.0, 50.0, 150.0];
 /// Rings of the disk.

@@ -67,17 +67,22 @@ pub fn svg(figure: &Figure) -> Result<String, Failed> {
     Ok(text.replacen(&size(width, height), &size(width / FINE, height / FINE), 1))
 }
 
-/// Series by lines of the legend: the place of each, and its index.
-fn legend(panel: &Panel) -> Vec<Vec<(u32, usize)>> {
+/// What stands for the curves of all series.
+const CURVES: &str = "closed form";
+
+/// Words of the legend by lines: the place of each, and the series, none for the curves.
+fn legend<'a>(panel: &'a Panel) -> Vec<Vec<(u32, &'a str, Option<usize>)>> {
+    let names = panel.series.iter().enumerate().map(|(index, series)| (series.name.as_str(), Some(index)));
+    let curves = panel.series.iter().any(|series| !series.curve.is_empty()).then_some((CURVES, None));
     let mut lines = vec![vec![]];
     let mut at = LEFT;
-    for (index, series) in panel.series.iter().enumerate() {
-        let width = 5 * LETTER + LETTER * series.name.chars().count() as u32;
+    for (name, index) in names.chain(curves) {
+        let width = 5 * LETTER + LETTER * name.chars().count() as u32;
         if at + width > WIDTH && at > LEFT {
             lines.push(vec![]);
             at = LEFT;
         }
-        lines.last_mut().expect("there is a line").push((at, index));
+        lines.last_mut().expect("there is a line").push((at, name, index));
         at += width;
     }
     lines
@@ -87,14 +92,18 @@ fn draw_legend(panel: &Panel, area: &DrawingArea<SVGBackend, Shift>) -> Result<(
     let style = (FONT, SMALL).into_font().into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
     for (row, line) in legend(panel).into_iter().enumerate() {
         let y = (row as u32 * LINE + LINE / 2) as i32;
-        for (x, index) in line {
-            let (series, colour) = (&panel.series[index], COLOURS[index % COLOURS.len()]);
+        for (x, name, index) in line {
             let (x, width) = (x as i32, 3 * LETTER as i32);
-            if !series.curve.is_empty() {
-                area.draw(&PathElement::new([(x, y), (x + width, y)], colour.stroke_width(STROKE)))?;
+            match index {
+                None => {
+                    area.draw(&PathElement::new([(x, y), (x + width, y)], BLACK.mix(0.5).stroke_width(STROKE)))?;
+                }
+                Some(index) => {
+                    let style = marker(&panel.series[index], COLOURS[index % COLOURS.len()]);
+                    area.draw(&Circle::new((x + width / 2, y), RADIUS, style))?;
+                }
             }
-            area.draw(&Circle::new((x + width / 2, y), RADIUS, marker(series, colour)))?;
-            area.draw_text(&series.name, &style, (x + width + LETTER as i32 / 2, y))?;
+            area.draw_text(name, &style, (x + width + LETTER as i32 / 2, y))?;
         }
     }
     Ok(())

@@ -7,6 +7,7 @@ mod harness;
 mod inspect;
 mod integrator;
 mod lights;
+mod measure;
 mod repeatable;
 mod scenes;
 mod statistics;

@@ -3,6 +3,7 @@
 mod image;
 mod inspect;
 mod interrupt;
+mod measure;
 mod merge;
 mod usage;
 
