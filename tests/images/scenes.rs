@@ -1,6 +1,8 @@
 //! Scenes with a known answer.
 
 use serde_json::Value;
+// Each test program uses its part.
+#[allow(unused_imports)]
 pub use translucent::measure::scenes::{Eye, Mesh, gltf, matter, sun};
 use translucent::{Scene, scene::LoadOptions};
 
