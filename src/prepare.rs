@@ -248,6 +248,10 @@ fn coefficients(medium: &Medium, ior: f64, scale: f64, c: usize) -> Coefficients
     if extinction > 0.0 { authored.in_units(extinction / kept) } else { authored }
 }
 
+/// No two points of a set are farther apart: the frame gives translucent geometry the radius 1. Nothing is missed, and a
+/// probe that runs within a triangle's plane meets no rounding of its distance that looks like a hit far away.
+pub const SET_DIAMETER: f32 = 2.000_01;
+
 fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings) -> Result<Material> {
     let mut out = match &material.medium {
         None => Material::default(),
@@ -257,7 +261,8 @@ fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings
                 .ok_or_else(|| Error::setting("model", format!("the {model} model is not built yet")))?;
             let coefficients = [0, 1, 2].map(|c| coefficients(medium, material.ior, frame.scale, c));
             let options = profile::Options { normalisation: settings.normalisation, radius_tail: settings.radius_tail };
-            let out = profile::material(constant, &coefficients, options);
+            let mut out = profile::material(constant, &coefficients, options);
+            out.radius_max = out.radius_max.min(SET_DIAMETER);
             if settings.projection == Projection::Camera && out.component_cdf[8] > 0.0 && out.camera_rate <= 0.0 {
                 let problem = format!(
                     "camera needs sigma_tr > 0 in every channel, but material \"{}\" ({}) absorbs nothing in one; use mis or normal",

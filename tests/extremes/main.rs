@@ -17,6 +17,12 @@ use harness::{channel, render};
 /// Case, what could go wrong, what holds, and the test that shows it: file and function.
 const ROWS: &[(&str, &str, &str, &str)] = &[
     (
+        "a million random sets of matter, surface, light and camera through every kernel",
+        "NaN, infinity, negative light",
+        "none; within 1e-3 of the twin but for 1e-2 at most",
+        "kernels/sweep.rs::a_million_sets_through_every_kernel",
+    ),
+    (
         "sigma_t' 1e-6 to 1e9 per radius, alpha' 0, 1e-6, .5, .999, 1 - 2^-24, 1, n .7, 1 - 1e-6, 1, 1 + 1e-6, 1.3, 3; all combinations",
         "0/0, overflow, negative light, wrong energy",
         "a ball in uniform light has its closed form, finite everywhere",

@@ -14,6 +14,7 @@ mod shared;
 mod sphere;
 mod stages;
 mod steps;
+mod sweep;
 
 use bytemuck::Pod;
 use glam::UVec4;
