@@ -82,6 +82,7 @@ pub mod render;
 pub mod scene;
 pub mod settings;
 pub mod shared;
+pub mod table;
 
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
