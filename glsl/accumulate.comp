@@ -72,6 +72,7 @@ void main() {
     View view = views[0];
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
+    if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));
     uint batch = step_.sample_index % BATCHES;
@@ -169,10 +170,15 @@ void main() {
             }
             if (k >= first_direction || found == target) hit_count = 0u;
         }
-        if (open && hit_count == 0u) entering += light * transmittance(m.ior, cos_shading);
+        if (open && hit_count == 0u) {
+            light *= transmittance(m.ior, cos_shading);
+            if (has_model(m, MODEL_TABLE)) light *= table_obliqueness(m, cos_shading, false);
+            entering += light;
+        }
     }
 
     vec3 radiance = transmittance(m.ior, dot(s.shading_normal, s.wo)) * factor * entering;
+    if (has_model(m, MODEL_TABLE)) radiance *= table_obliqueness(m, dot(s.shading_normal, s.wo), true);
     // The base colour tints what crosses the surface, there and here.
     if (has_texture(TEXTURE_BASE_COLOR)) {
         radiance *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb

@@ -2,6 +2,7 @@
 // models that the scene uses. The mathematics is in src/reference/profile/.
 #include "profile_source.glsl"
 #include "profile_standard.glsl"
+#include "profile_table.glsl"
 
 // Whether a material has a model. Models that no material of the scene has cost nothing; a scene with one model does
 // not ask.
@@ -13,6 +14,7 @@ bool has_model(Material m, uint model) {
 // The profile over the material's strength, times e^shift, for each channel. Exponents are combined before exp: `shift`
 // is the exponent of what the caller multiplies by.
 vec3 shape_shifted(Material m, float r2, float shift) {
+    if (has_model(m, MODEL_TABLE)) return table_shape(m, r2, shift);
     return standard_shape(m, r2, shift);
 }
 
@@ -22,10 +24,12 @@ vec3 shape(Material m, float r2) {
 
 // Density of the radius per area of the plane.
 float radial_density(Material m, float r2) {
+    if (has_model(m, MODEL_TABLE)) return table_density(m, r2);
     return dot(m.density, shape(m, r2));
 }
 
 // Radius with that density.
 float draw_radius(Material m, float u_component, float u_radius) {
+    if (has_model(m, MODEL_TABLE)) return table_radius(m, u_component, u_radius);
     return standard_radius(m, u_component, u_radius);
 }

@@ -28,6 +28,7 @@ void main() {
     Material m = materials[shading.material];
     if ((m.flags & TRANSLUCENT) == 0 || m.component_cdf[8] == 0.0) return;
 
+    if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     View view = views[0];
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));

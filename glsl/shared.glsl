@@ -43,6 +43,14 @@ const uint MODEL_DIRECTIONAL = 2u;
 const uint MODEL_BURLEY = 3u;
 // Model: profiles tabulated by simulation.
 const uint MODEL_TABLE = 4u;
+// Bits of an f32 below those that number a cell of a tabulated profile.
+const uint TABLE_SHIFT = 21u;
+// Numbers before a table's values at each curvature.
+const uint TABLE_HEADER = 8u;
+// Most halvings in the search of a distribution function, for at most 500 cells.
+const uint TABLE_HALVINGS = 9u;
+// Most curvatures of a table.
+const uint TABLE_NODES = 40u;
 // No environment.
 const uint ENVIRONMENT_NONE = 0u;
 // The same radiance from everywhere.
@@ -127,6 +135,8 @@ layout(constant_id = 6) const uint EMISSIVE = 0;
 layout(constant_id = 7) const uint TEXTURED = 0;
 // Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
 layout(constant_id = 5) const uint MODELS = 0;
+// 1 where profiles depend on the curvature of the surface that is seen.
+layout(constant_id = 10) const uint CURVATURE = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -264,6 +274,13 @@ struct Material {
     float metallic;
     // Emitted radiance.
     vec3 emission;
+    // Table: its first number, first cell of the squared distance, cells and curvatures.
+    uint table;
+    uint table_first;
+    uint table_cells;
+    uint table_nodes;
+    // Table: mean of 1 - cosine of refraction over diffuse light that enters.
+    float obliqueness;
     // Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
     uint flags;
     // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
@@ -425,5 +442,9 @@ struct Pixel {
 #define TEXTURES(access) layout(set = 0, binding = 18, scalar) access buffer TexturesBlock { Texture textures[]; }
 // Coordinates of each triangle.
 #define COORDINATES(access) layout(set = 0, binding = 19, scalar) access buffer CoordinatesBlock { Coordinates coordinates[]; }
+// Tabulated profiles of the materials that have them; see `table::block`.
+#define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { float profiles[]; }
+// At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
+#define THICKNESS(access) layout(set = 0, binding = 21, scalar) access buffer ThicknessBlock { vec3 thickness[]; }
 
 layout(push_constant, scalar) uniform StepBlock { Step step_; };

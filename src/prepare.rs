@@ -27,6 +27,10 @@ pub struct Prepared {
     /// Texels and textures as their slots hold them; none without textures.
     pub texels: Vec<u32>,
     pub textures: Vec<Texture>,
+    /// Tabulated profiles, none without the table model.
+    pub profiles: Vec<f32>,
+    /// Curvatures at the vertices of each triangle, none where no profile depends on them.
+    pub thickness: Vec<Vec3>,
     /// The camera that looks, for what is said about the image.
     pub camera: Camera,
     /// Rows that are rendered: from the first, exclusive of the last.
@@ -58,7 +62,8 @@ impl Prepared {
             texels: &self.texels,
             textures: &self.textures,
             coordinates: &scene.coordinates,
-            profiles: &[],
+            profiles: &self.profiles,
+            thickness: &self.thickness,
         }
     }
 }
@@ -110,7 +115,12 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         return Err(Error::setting("radius tail", format!("{} is not in [0, 0.1)", settings.radius_tail)));
     }
 
-    let materials = scene.materials.iter().map(|m| material(m, scene.frame, settings)).collect::<Result<Vec<_>>>()?;
+    let mut profiles = vec![];
+    let materials = scene
+        .materials
+        .iter()
+        .map(|m| material(m, scene.frame, settings, &mut profiles))
+        .collect::<Result<Vec<_>>>()?;
     let frame = scene.frame;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
@@ -182,6 +192,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         environment_cdf,
         texels: vec![],
         textures: vec![],
+        profiles,
+        thickness: vec![],
         camera,
         rows: y0..y1,
     })
@@ -252,7 +264,12 @@ fn coefficients(medium: &Medium, ior: f64, scale: f64, c: usize) -> Coefficients
 /// probe that runs within a triangle's plane meets no rounding of its distance that looks like a hit far away.
 pub const SET_DIAMETER: f32 = 2.000_01;
 
-fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings) -> Result<Material> {
+fn material(
+    material: &crate::scene::Material,
+    frame: Frame,
+    settings: &Settings,
+    profiles: &mut Vec<f32>,
+) -> Result<Material> {
     let mut out = match &material.medium {
         None => Material::default(),
         Some(medium) => {
@@ -261,7 +278,11 @@ fn material(material: &crate::scene::Material, frame: Frame, settings: &Settings
                 .ok_or_else(|| Error::setting("model", format!("the {model} model is not built yet")))?;
             let coefficients = [0, 1, 2].map(|c| coefficients(medium, material.ior, frame.scale, c));
             let options = profile::Options { normalisation: settings.normalisation, radius_tail: settings.radius_tail };
-            let mut out = profile::material(constant, &coefficients, options);
+            let mut out = if constant == shared::MODEL_TABLE {
+                profile::tabulated(&coefficients, options, &[], profiles)
+            } else {
+                profile::material(constant, &coefficients, options)
+            };
             out.radius_max = out.radius_max.min(SET_DIAMETER);
             if settings.projection == Projection::Camera && out.component_cdf[8] > 0.0 && out.camera_rate <= 0.0 {
                 let problem = format!(

@@ -209,6 +209,14 @@ constants! {
     MODEL_BURLEY: u32 = 3;
     /// Model: profiles tabulated by simulation.
     MODEL_TABLE: u32 = 4;
+    /// Bits of an f32 below those that number a cell of a tabulated profile.
+    TABLE_SHIFT: u32 = 21;
+    /// Numbers before a table's values at each curvature.
+    TABLE_HEADER: u32 = 8;
+    /// Most halvings in the search of a distribution function, for at most 500 cells.
+    TABLE_HALVINGS: u32 = 9;
+    /// Most curvatures of a table.
+    TABLE_NODES: u32 = 40;
 
     /// No environment.
     ENVIRONMENT_NONE: u32 = 0;
@@ -422,6 +430,13 @@ structs! {
         metallic: f32,
         /// Emitted radiance.
         emission: Vec3,
+        /// Table: its first number, first cell of the squared distance, cells and curvatures.
+        table: u32,
+        table_first: u32,
+        table_cells: u32,
+        table_nodes: u32,
+        /// Table: mean of 1 - cosine of refraction over diffuse light that enters.
+        obliqueness: f32,
         /// Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
         flags: u32,
         /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
@@ -585,6 +600,10 @@ buffers! {
     Textures = 18: TEXTURES [Texture] textures;
     /// Coordinates of each triangle.
     Coordinates = 19: COORDINATES [Coordinates] coordinates;
+    /// Tabulated profiles of the materials that have them; see `table::block`.
+    Profiles = 20: PROFILES [f32] profiles;
+    /// At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
+    Thickness = 21: THICKNESS [Vec3] thickness;
 }
 
 features! {
@@ -602,6 +621,8 @@ features! {
     textures = 7: TEXTURED,
     /// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
     models = 5: MODELS,
+    /// 1 where profiles depend on the curvature of the surface that is seen.
+    curvature = 10: CURVATURE,
 }
 
 impl Features {

@@ -22,7 +22,7 @@ use super::boundary::transmittance;
 use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::pixel::position;
-use super::profile::{Matter, shapes, shapes_shifted};
+use super::profile::{self, Matter, shapes, shapes_shifted};
 use super::projection::{Seen, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal};
 use super::random::{batch, key, scramble, sobol, unit};
 use super::sample::coordinate;
@@ -98,8 +98,9 @@ pub fn accumulate(
     let entry = Entry::new(inputs, ior, seen.side, point, hits.triangle[chosen]);
     let leaving = entry.tint
         * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
-        * transmittance(ior, seen.shading_normal.dot(seen.wo));
-    Contribution::of(leaving * factor * entering_light(inputs, step, index, &entry))
+        * transmittance(ior, seen.shading_normal.dot(seen.wo))
+        * profile::obliqueness(matter, seen.shading_normal.dot(seen.wo), true);
+    Contribution::of(leaving * factor * entering_light(inputs, step, index, matter, &entry))
 }
 
 /// The base colour's texture, which tints what crosses the surface; the factor is in the profile's strength.
@@ -195,7 +196,7 @@ impl Entry {
 }
 
 /// E: the light of the step's rays that enters.
-fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry) -> DVec3 {
+fn entering_light(inputs: &Inputs, step: &Step, index: u32, matter: Matter, entry: &Entry) -> DVec3 {
     let origin = lifted(entry.point, entry.normal);
     let first_direction = inputs.features.first_direction(inputs.view);
     let directions = f64::from(inputs.view.directions);
@@ -203,7 +204,10 @@ fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry) -> DV
         // Most rays need not be traced.
         let entering = |wi: DVec3, light: &dyn Fn() -> DVec3| {
             let transmission = entry.transmission(wi);
-            if transmission > 0.0 { transmission * light() } else { DVec3::ZERO }
+            if transmission <= 0.0 {
+                return DVec3::ZERO;
+            }
+            profile::obliqueness(matter, entry.shading.dot(wi), false) * transmission * light()
         };
         if let Some(light) = inputs.lights.get(k as usize) {
             let incident = light::delta(light, entry.point);

@@ -55,6 +55,8 @@ pub struct Inputs<'a> {
     pub coordinates: &'a [Coordinates],
     /// Tabulated profiles of the materials.
     pub profiles: &'a [f32],
+    /// Curvatures at the vertices of each triangle; empty where no profile depends on them.
+    pub thickness: &'a [Vec3],
 }
 
 /// The step of one sample that traces all its rays in one dispatch.

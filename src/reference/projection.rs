@@ -109,9 +109,16 @@ pub fn material<'a>(inputs: &Inputs<'a>, surface: &Surface) -> &'a Material {
     &inputs.materials[inputs.shadings[surface.triangle as usize].material as usize]
 }
 
-/// The same, with what its profile reads.
+/// 1 over the radius of the sphere that the body resembles at the surface; 0 where that is not asked for.
+pub fn curvature(inputs: &Inputs, surface: &Surface) -> f64 {
+    let Some(curvatures) = inputs.thickness.get(surface.triangle as usize) else { return 0.0 };
+    let [b1, b2] = surface.barycentric.as_dvec2().to_array();
+    curvatures.as_dvec3().dot(DVec3::new(1.0 - b1 - b2, b1, b2))
+}
+
+/// The material, with what its profile reads.
 pub fn matter_at<'a>(inputs: &Inputs<'a>, surface: &Surface) -> Matter<'a> {
-    Matter { material: material(inputs, surface), tables: inputs.profiles }
+    Matter { material: material(inputs, surface), tables: inputs.profiles, curvature: curvature(inputs, surface) }
 }
 
 /// Fractions of the techniques at a point seen with cosine `cos`.

@@ -365,6 +365,8 @@ fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u
         (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),
         (Slot::Textures, bytemuck::cast_slice(&prepared.textures)),
         (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
+        (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
+        (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
     ]
     .into_iter()
     .filter(|(_, data)| !data.is_empty())

@@ -4,7 +4,7 @@
 //! shift and agree to the bit. Node i is the smallest number of cell i.
 
 /// Bits of an f32 below those that number the cell.
-pub const SHIFT: u32 = 23 - 2;
+pub const SHIFT: u32 = crate::shared::TABLE_SHIFT;
 
 /// Cell of the squared distance s >= 0.
 pub fn cell(s: f32) -> u32 {

@@ -20,7 +20,7 @@ use super::single::Matter;
 use super::walk::{CELLS, Estimate, FIRST, Incidence, Leaving, Walk, reached};
 use crate::reference::boundary::{Side, diffuse_reflectance, transmittance};
 use crate::reference::math::integrate;
-use crate::reference::profile::{Dipole, boundary_factor};
+use crate::reference::profile::{Dipole, Radial, boundary_factor};
 use std::f64::consts::PI;
 
 /// e = sqrt(3 (1 - alpha')) of the tabulated albedos.
@@ -149,6 +149,12 @@ impl White {
         let matter =
             Matter { sigma_s: 1.0 / (1.0 - self.g), sigma_a: (1.0 - albedo) / albedo, g: self.g, ior: self.ior };
         Profile { matter, radius, dipole: continuation(albedo, self.ior), parts: curves }
+    }
+
+    /// Distance beyond which at most a share of the half-space's light leaves, by the dipole that continues the profile, in
+    /// units of 1 / sigma_s'.
+    pub fn tail(&self, albedo: f64, share: f64) -> f64 {
+        continuation(albedo, self.ior).radius_beyond(share).max(4.0)
     }
 
     /// (node, weight, stretch) of the nodes around a radius.

@@ -30,6 +30,8 @@ pub struct World {
     pub texels: Vec<u32>,
     pub textures: Vec<Texture>,
     pub coordinates: Vec<Coordinates>,
+    pub profiles: Vec<f32>,
+    pub thickness: Vec<Vec3>,
 }
 
 impl World {
@@ -72,7 +74,8 @@ impl World {
             texels: &self.texels,
             textures: &self.textures,
             coordinates: &self.coordinates,
-            profiles: &[],
+            profiles: &self.profiles,
+            thickness: &self.thickness,
         }
     }
 

@@ -11,6 +11,7 @@ mod measure;
 mod repeatable;
 mod scenes;
 mod statistics;
+mod table;
 mod twins;
 
 pub use harness::{channel, device, mean_and_error, render};

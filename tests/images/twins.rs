@@ -31,7 +31,7 @@ pub fn layer(image: &Image, name: &str, i: usize) -> Vec3 {
 }
 
 /// Relative differences of both layers at every pixel that has light; what is no sum of f32 rounding must agree exactly.
-fn differences(image: &Image, twins: &[Pixel]) -> Vec<f64> {
+pub fn differences(image: &Image, twins: &[Pixel]) -> Vec<f64> {
     let mut found = vec![];
     for (i, twin) in twins.iter().enumerate() {
         assert_eq!(channel(image, "samples.Y")[i], twin.samples as f32, "pixel {i}");

@@ -68,6 +68,7 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         textures: &[],
         coordinates: &[],
         profiles: &[],
+        thickness: &[],
     };
     let mut bench = bench();
     bench.add("math", &compile(), &inputs.features);

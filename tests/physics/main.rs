@@ -11,4 +11,5 @@ mod profile;
 mod random;
 mod sphere;
 mod stages;
+mod table;
 mod walk;

@@ -17,14 +17,17 @@
 
 mod source;
 pub mod standard;
+pub mod table;
 
 pub use source::Source;
 pub use standard::{Dipole, boundary_factor, invert_total};
+pub use table::Tabulated;
 
 use super::boundary::{Side, diffuse_reflectance};
 use crate::scene::{LengthKind, Medium};
 use crate::settings::{Model, Normalisation};
-use crate::shared::{self, MODEL_STANDARD, Material, TRANSLUCENT};
+use crate::shared::{self, MODEL_STANDARD, MODEL_TABLE, Material, TRANSLUCENT};
+use crate::table::block::Block;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::ops::Deref;
@@ -157,7 +160,7 @@ pub trait Radial {
 macro_rules! models {
     ($($setting:ident, $constant:ident: $type:ty;)*) => {
         /// One channel's profile, of whichever model.
-        #[derive(Clone, Copy, Debug)]
+        #[derive(Clone, Debug)]
         pub enum Profile { $($setting($type),)* }
 
         impl Deref for Profile {
@@ -197,6 +200,7 @@ macro_rules! models {
 }
 models! {
     Standard, MODEL_STANDARD: Dipole;
+    Table, MODEL_TABLE: Tabulated;
 }
 
 /// A material with what else its profile reads.
@@ -205,17 +209,22 @@ pub struct Matter<'a> {
     pub material: &'a Material,
     /// Tabulated profiles of all materials.
     pub tables: &'a [f32],
+    /// 1 over the radius of the sphere that the body resembles at xo; 0 for a half-space.
+    pub curvature: f64,
 }
 
 impl<'a> From<&'a Material> for Matter<'a> {
     /// A material that needs no table.
     fn from(material: &'a Material) -> Matter<'a> {
-        Matter { material, tables: &[] }
+        Matter { material, tables: &[], curvature: 0.0 }
     }
 }
 
 /// shape(r) e^exponent of the three channels.
 pub fn shapes_shifted(matter: Matter, r: f64, exponent: f64) -> DVec3 {
+    if matter.material.model == MODEL_TABLE {
+        return table::shapes(matter, r).map(|value| table::shifted(value, exponent));
+    }
     DVec3::from([0, 1, 2].map(|c| Profile::unpack(matter, c).shape_shifted(r, exponent)))
 }
 
@@ -226,7 +235,15 @@ pub fn shapes(matter: Matter, r: f64) -> DVec3 {
 
 /// Density of the sampled radii per area of the plane.
 pub fn plane_density(matter: Matter, r: f64) -> f64 {
+    if matter.material.model == MODEL_TABLE {
+        return table::density(matter, r);
+    }
     matter.material.density.as_dvec3().dot(shapes(matter, r))
+}
+
+/// Factor of the profile on light that enters, or leaves, at a cosine outside; 1 but for the table model.
+pub fn obliqueness(matter: Matter, cos: f64, leaving: bool) -> DVec3 {
+    if matter.material.model == MODEL_TABLE { table::obliqueness(matter, cos, leaving) } else { DVec3::ONE }
 }
 
 /// The radius that two numbers in [0, 1) pick.
@@ -235,6 +252,9 @@ pub fn draw_radius(matter: Matter, u_component: f64, u_radius: f64) -> f64 {
     let component = cdf.iter().position(|&end| u_component < end).unwrap_or(cdf.len() - 1);
     let start = if component == 0 { 0.0 } else { cdf[component - 1] };
     let share = if cdf[component] > start { (u_component - start) / (cdf[component] - start) } else { 0.0 };
+    if matter.material.model == MODEL_TABLE {
+        return table::radius(matter, component / COMPONENTS, share, u_radius);
+    }
     Profile::unpack(matter, component / COMPONENTS).radius(component % COMPONENTS, share, u_radius)
 }
 
@@ -285,4 +305,21 @@ pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> sha
     material.camera_rate = scattering().map(|c| c.rate()).reduce(f64::min).unwrap_or(0.0) as f32;
     material.base_color = Vec3::ZERO;
     material
+}
+
+/// The same for the table model: its numbers are appended to `tables`. `spheres` are the radii 2^(i/2 - 1) at which it
+/// knows the profile besides the half-space, i ascending.
+pub fn tabulated(
+    matter: &[Coefficients; 3],
+    options: Options,
+    spheres: &[i32],
+    tables: &mut Vec<f32>,
+) -> shared::Material {
+    let mut out = material(MODEL_TABLE, matter, options);
+    let block = Block::new(&matter.each_ref().map(crate::table::channel), spheres);
+    out.table = tables.len() as u32;
+    (out.table_first, out.table_cells, out.table_nodes) = (block.first, block.cells, block.nodes);
+    out.obliqueness = crate::table::white::mean_obliqueness(matter[0].ior) as f32;
+    tables.extend(block.data);
+    out
 }

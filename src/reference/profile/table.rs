@@ -1,0 +1,258 @@
+//! Profiles tabulated by simulation, as kernels read them: twin of `profile_table.glsl`. [`crate::table`] makes them.
+//!
+//! A table holds values at the nodes of r^2 and the light within them, for spheres of several radii and the half-space;
+//! see [`crate::table::block`]. Between two radii a1 < a < a2 of spheres
+//!
+//!   f(r) = sum of w_k c_k^2 f_k(c_k r),  w linear in 1/a,  c_k = a_k / a,
+//!
+//! so that each part ends at the diameter 2 a and keeps its total; c_k = 1 where the half-space is one of the two.
+//! Drawn is a channel, one of the two with the probability w_k, and r^2 from its distribution function.
+//!
+//! # Oblique light
+//! A table is for light that entered along the normal. Light refracted to the cosine mu' leaves in the total T(mu') =
+//! T(1) (1 + k (1 - mu')), with k from the total under diffuse light: that factor stands at the entry and, since light
+//! paths can be reversed, at the exit, divided there by its mean.
+
+use super::{COMPONENTS, Coefficients, Matter, Radial};
+use crate::shared::Material;
+use crate::table::{self, block::{Block, HEADER}, grid};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// The profile of one channel on a half-space.
+#[derive(Clone, Debug)]
+pub struct Tabulated {
+    first: u32,
+    /// Total, 0 for matter that does not scatter; 1 where it is the kernels' strength.
+    strength: f64,
+    rate: f64,
+    values: Vec<f32>,
+    within: Vec<f32>,
+}
+
+/// One channel at one node of the curvature.
+#[derive(Clone, Copy)]
+struct Column<'a> {
+    first: u32,
+    reached: usize,
+    values: &'a [f32],
+    within: &'a [f32],
+}
+
+impl Column<'_> {
+    /// Value at the squared distance.
+    fn value(&self, s: f64) -> f64 {
+        let cell = grid::cell(s as f32);
+        if cell < self.first {
+            return f64::from(self.within[0]) / (PI * f64::from(grid::node(self.first)));
+        }
+        let i = (cell - self.first) as usize;
+        if i >= self.reached {
+            return 0.0;
+        }
+        let [low, high] = [cell, cell + 1].map(|cell| f64::from(grid::node(cell)));
+        let t = (s - low) / (high - low);
+        f64::from(self.values[i]) * (1.0 - t) + f64::from(self.values[i + 1]) * t
+    }
+
+    /// Squared distance within which the share u of the light lies.
+    fn draw(&self, u: f64) -> f64 {
+        let target = u * f64::from(self.within[self.reached]);
+        let first = f64::from(grid::node(self.first));
+        if target < f64::from(self.within[0]) {
+            return first * target / f64::from(self.within[0]);
+        }
+        let i = self.within[..self.reached].partition_point(|&light| f64::from(light) <= target) - 1;
+        let [low, high] = [0, 1].map(|k| f64::from(grid::node(self.first + i as u32 + k)));
+        let [a, b] = [i, i + 1].map(|i| f64::from(self.values[i]));
+        // Light from the edge over the cell's area: a t + (b - a) t^2 / 2.
+        let q = (target - f64::from(self.within[i])) / (PI * (high - low));
+        let root = a + (a * a + 2.0 * (b - a) * q).max(0.0).sqrt();
+        let t = if root > 0.0 { (2.0 * q / root).min(1.0) } else { 0.0 };
+        low + t * (high - low)
+    }
+
+    /// Light within the squared distance.
+    fn inside(&self, s: f64) -> f64 {
+        let cell = grid::cell(s as f32);
+        if cell < self.first {
+            return f64::from(self.within[0]) * s / f64::from(grid::node(self.first));
+        }
+        let i = (cell - self.first) as usize;
+        if i >= self.reached {
+            return f64::from(self.within[self.reached]);
+        }
+        let low = f64::from(grid::node(cell));
+        f64::from(self.within[i]) + PI * (s - low) * (f64::from(self.values[i]) + self.value(s)) / 2.0
+    }
+}
+
+/// Node k of a material's table.
+struct Node<'a> {
+    data: &'a [f32],
+    first: u32,
+    cells: usize,
+}
+
+impl<'a> Node<'a> {
+    fn of(matter: Matter<'a>, k: usize) -> Node<'a> {
+        let Material { table, table_first, table_cells, .. } = *matter.material;
+        let stride = Block::stride(table_cells);
+        let data = &matter.tables[table as usize + k * stride..][..stride];
+        Node { data, first: table_first, cells: table_cells as usize }
+    }
+
+    fn curvature(&self) -> f64 {
+        f64::from(self.data[0])
+    }
+
+    fn vector(&self, at: usize) -> DVec3 {
+        DVec3::from([0, 1, 2].map(|c| f64::from(self.data[at + c])))
+    }
+
+    fn column(&self, c: usize) -> Column<'a> {
+        let n = self.cells + 1;
+        let (values, within) = self.data[HEADER + 2 * c * n..][..2 * n].split_at(n);
+        Column { first: self.first, reached: self.data[1] as usize, values, within }
+    }
+
+    fn values(&self, s: f64) -> DVec3 {
+        DVec3::from([0, 1, 2].map(|c| self.column(c).value(s)))
+    }
+}
+
+/// The nodes around the matter's curvature with their weights w and factors c on distances.
+fn nodes(matter: Matter) -> Vec<(usize, f64, f64)> {
+    let curvature = matter.curvature;
+    let count = matter.material.table_nodes as usize;
+    let of = |k: usize| Node::of(matter, k).curvature();
+    let stretch = |k: usize, other: f64| if other > 0.0 && of(k) > 0.0 && curvature > 0.0 { curvature / of(k) } else { 1.0 };
+    // Curvatures fall from node to node.
+    let above = (0..count).take_while(|&k| of(k) > curvature).count();
+    if above == count {
+        return vec![(count - 1, 1.0, 1.0)];
+    }
+    if above == 0 {
+        return vec![(0, 1.0, stretch(0, of(0)))];
+    }
+    let (high, low) = (of(above - 1), of(above));
+    let weight = (curvature - low) / (high - low);
+    vec![(above - 1, weight, stretch(above - 1, low)), (above, 1.0 - weight, stretch(above, low))]
+}
+
+/// shape(r) of the three channels.
+pub(super) fn shapes(matter: Matter, r: f64) -> DVec3 {
+    nodes(matter).into_iter().map(|(k, w, c)| w * c * c * Node::of(matter, k).values(r * r * c * c)).sum()
+}
+
+/// Density of the sampled radii per area of the plane.
+pub(super) fn density(matter: Matter, r: f64) -> f64 {
+    let part = |(k, w, c): (usize, f64, f64)| {
+        let node = Node::of(matter, k);
+        w * c * c * (node.values(r * r * c * c) * node.vector(2)).dot(matter.material.density.as_dvec3())
+    };
+    nodes(matter).into_iter().map(part).sum()
+}
+
+/// The radius that the numbers pick in channel c: `share` the node, u the distance.
+pub(super) fn radius(matter: Matter, c: usize, share: f64, u: f64) -> f64 {
+    let nodes = nodes(matter);
+    let (k, _, stretch) = nodes[usize::from(nodes.len() > 1 && share >= nodes[0].1)];
+    Node::of(matter, k).column(c).draw(u).sqrt() / stretch
+}
+
+/// The factor 1 + k (1 - mu') on light that enters, or 1 over its mean times it on light that leaves, at the cosine
+/// outside.
+pub(super) fn obliqueness(matter: Matter, cos: f64, leaving: bool) -> DVec3 {
+    let slope: DVec3 = nodes(matter).into_iter().map(|(k, w, _)| w * Node::of(matter, k).vector(5)).sum();
+    let n = f64::from(matter.material.ior);
+    let inside = (1.0 - (1.0 - cos * cos) / (n * n)).max(0.0).sqrt();
+    let factor = DVec3::ONE + slope * (1.0 - inside);
+    if leaving { factor / (DVec3::ONE + slope * f64::from(matter.material.obliqueness)) } else { factor }
+}
+
+impl Tabulated {
+    /// The channel on a half-space.
+    pub(super) fn of(matter: &Coefficients) -> Tabulated {
+        let channel = table::channel(matter);
+        let block = Block::new(&[channel.clone(), None, None], &[]);
+        let n = block.cells as usize + 1;
+        let (values, within) = block.data[HEADER..HEADER + 2 * n].split_at(n);
+        Tabulated {
+            first: block.first,
+            strength: block.totals.x,
+            rate: channel.map_or(0.0, |channel| channel.rate()),
+            values: values.to_vec(),
+            within: within.to_vec(),
+        }
+    }
+
+    pub(super) fn unpack(matter: Matter, c: usize) -> Tabulated {
+        let node = Node::of(matter, matter.material.table_nodes as usize - 1);
+        let column = node.column(c);
+        Tabulated {
+            first: column.first,
+            strength: 1.0,
+            rate: f64::from(matter.material.sigma_tr[c]),
+            values: column.values.to_vec(),
+            within: column.within.to_vec(),
+        }
+    }
+
+    fn column(&self) -> Column<'_> {
+        Column { first: self.first, reached: self.values.len() - 1, values: &self.values, within: &self.within }
+    }
+}
+
+impl Radial for Tabulated {
+    fn shape_shifted(&self, r: f64, exponent: f64) -> f64 {
+        shifted(self.column().value(r * r), exponent)
+    }
+
+    fn strength(&self) -> f64 {
+        self.strength
+    }
+
+    fn masses(&self) -> [f64; COMPONENTS] {
+        [f64::from(*self.within.last().expect("a table has nodes")), 0.0, 0.0]
+    }
+
+    fn inside(&self, radius: f64) -> f64 {
+        self.column().inside(radius * radius)
+    }
+
+    fn outside(&self, radius: f64) -> f64 {
+        (self.mass() - self.inside(radius)).max(0.0)
+    }
+
+    /// Cell by cell, with J_0 by its integral (Bessel's first).
+    fn response(&self, k: f64) -> f64 {
+        let bessel = |x: f64| {
+            let n = 16 + (x.abs() / 2.0) as usize;
+            (0..n).map(|i| (x * ((i as f64 + 0.5) * PI / n as f64).sin()).cos()).sum::<f64>() / n as f64
+        };
+        let ring = |a: f64, b: f64| {
+            let panels = 1 + (k * (b - a)) as usize;
+            crate::reference::math::integrate(a, b, panels, |r| 2.0 * PI * r * self.shape(r) * bessel(k * r))
+        };
+        let edge = |i: usize| f64::from(grid::node(self.first + i as u32)).sqrt();
+        ring(0.0, edge(0)) + (1..self.values.len()).map(|i| ring(edge(i - 1), edge(i))).sum::<f64>()
+    }
+
+    fn radius(&self, _component: usize, _share: f64, u: f64) -> f64 {
+        self.column().draw(u).sqrt()
+    }
+
+    fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    fn pack(&self, c: usize, material: &mut Material) {
+        material.sigma_tr[c] = self.rate as f32;
+    }
+}
+
+/// value e^exponent, though one of them may leave the range of numbers.
+pub(super) fn shifted(value: f64, exponent: f64) -> f64 {
+    if exponent == 0.0 || value <= 0.0 { value } else { (value.ln() + exponent).exp() }
+}

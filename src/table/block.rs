@@ -1,0 +1,160 @@
+//! The profiles of a material as kernels read them: values and distribution functions on the cells of [`grid`].
+//!
+//! # Interpolation
+//! Between the nodes of the grid a profile is linear in r^2. So its integral over an annulus is exact, its inverse a
+//! square root, and the light drawn from the distribution function has the profile as its density. Below the first node
+//! it is constant with the right integral (it grows like 1/r there); beyond the last it is zero. The values at the nodes
+//! are those for which each pair of cells holds the light of the simulation's profile.
+//!
+//! # Layout
+//! Node by node of the curvature: 1/a, the number of cells that the sphere reaches, 1 / mass of each channel, slope of the
+//! total in 1 - mu' of each channel; then for each channel the values at the nodes of the grid and the light within them.
+//! A profile is divided by the total of the half-space, which is in the material's strength.
+
+use super::grid;
+use super::white::{Profile, White};
+use glam::DVec3;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Numbers before the values of a curvature.
+pub const HEADER: usize = crate::shared::TABLE_HEADER as usize;
+/// Light that may lie beyond the table.
+const BEYOND: f64 = 1e-6;
+/// Most cells of a table, whatever the range of its channels' mean free paths.
+pub const MOST_CELLS: u32 = 500;
+
+/// One channel of matter with its table.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    pub table: Arc<White>,
+    /// alpha', above 0.
+    pub albedo: f64,
+    /// sigma_s' [1/length].
+    pub scattering: f64,
+}
+
+impl Channel {
+    /// R(r) on a sphere of the radius; lengths within in units of 1 / sigma_s'.
+    pub fn profile(&self, radius: f64) -> Profile {
+        self.table.profile(self.albedo, radius * self.scattering)
+    }
+}
+
+/// The tables of a material's channels. A channel that does not scatter has none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// First cell of the squared distance.
+    pub first: u32,
+    pub cells: u32,
+    /// Totals of the half-space.
+    pub totals: DVec3,
+    pub nodes: u32,
+    /// The numbers, in the order of the layout.
+    pub data: Vec<f32>,
+}
+
+/// One channel on one sphere.
+struct Column {
+    total: f64,
+    slope: f64,
+    values: Vec<f64>,
+    within: Vec<f64>,
+}
+
+impl Block {
+    /// The tables of three channels on spheres of the radii 2^(i/2 - 1) [length], i ascending, and on the half-space.
+    pub fn new(channels: &[Option<Channel>; 3], spheres: &[i32]) -> Block {
+        let present = || channels.iter().flatten();
+        let finest = present().map(|c| 1.0 / (c.scattering / c.albedo)).fold(f64::INFINITY, f64::min);
+        let farthest = present()
+            .map(|c| c.table.tail(c.albedo, BEYOND) / c.scattering)
+            .fold(0.0, f64::max);
+        let smallest = spheres.first().map_or(f64::INFINITY, |&i| sphere(i));
+        let low = if finest.is_finite() { finest.min(smallest) / 4096.0 } else { 1.0 };
+        let first = grid::cell((low * low) as f32);
+        let end = grid::cell((farthest * farthest) as f32) + 1;
+        let cells = end.saturating_sub(first).clamp(1, MOST_CELLS);
+        let mut block = Block { first, cells, totals: DVec3::ZERO, nodes: spheres.len() as u32 + 1, data: vec![] };
+        let plane = channels.each_ref().map(|c| c.as_ref().map(|c| block.column(c, f64::INFINITY, cells)));
+        for (total, column) in block.totals.as_mut().iter_mut().zip(&plane) {
+            *total = column.as_ref().map_or(0.0, |column| column.total);
+        }
+        for &exponent in spheres {
+            let radius = sphere(exponent);
+            let reached = (grid::cell((4.0 * radius * radius) as f32).saturating_sub(first)).clamp(1, cells);
+            let columns = channels.each_ref().map(|c| c.as_ref().map(|c| block.column(c, radius, reached)));
+            block.push(1.0 / radius, reached, &columns);
+        }
+        block.push(0.0, cells, &plane);
+        block
+    }
+
+    /// Numbers of one curvature.
+    pub fn stride(cells: u32) -> usize {
+        HEADER + 6 * (cells as usize + 1)
+    }
+
+    fn push(&mut self, curvature: f64, reached: u32, columns: &[Option<Column>; 3]) {
+        let (data, totals) = (&mut self.data, self.totals);
+        let channel = |c: usize| columns[c].as_ref().map(|column| (column, totals[c]));
+        data.extend([curvature as f32, reached as f32]);
+        data.extend((0..3).map(|c| channel(c).map_or(0.0, |(column, total)| (total / column.total) as f32)));
+        data.extend((0..3).map(|c| channel(c).map_or(0.0, |(column, _)| column.slope as f32)));
+        for c in 0..3 {
+            match channel(c) {
+                None => data.resize(data.len() + 2 * (self.cells as usize + 1), 0.0),
+                Some((column, total)) => {
+                    data.extend(column.values.iter().chain(&column.within).map(|x| (x / total) as f32));
+                }
+            }
+        }
+    }
+
+    /// One channel on a sphere that reaches a number of cells.
+    fn column(&self, channel: &Channel, radius: f64, reached: u32) -> Column {
+        let profile = channel.profile(radius);
+        let k = channel.scattering;
+        let value = |s: f64| k * k * profile.value((s.sqrt() * k).min(2.0 * radius * k));
+        let node = |i: usize| f64::from(grid::node(self.first + i as u32));
+        let reached = reached as usize;
+        let mut values: Vec<f64> = (0..=reached).map(|i| value(node(i))).collect();
+        let areas: Vec<f64> = (0..reached).map(|i| PI * (node(i + 1) - node(i))).collect();
+        // Light of each cell by Simpson's rule in r, and of what lies below: R falls like 1/r there.
+        let light: Vec<f64> = (0..reached)
+            .map(|i| {
+                let (a, b) = (node(i).sqrt(), node(i + 1).sqrt());
+                let middle = (a + b) / 2.0;
+                PI / 3.0 * (b - a) * (a * values[i] + 4.0 * middle * value(middle * middle) + b * values[i + 1])
+            })
+            .collect();
+        let inner = 2.0 * PI * node(0) * values[0];
+        for _ in 0..3 {
+            let ratio: Vec<f64> = (0..reached)
+                .map(|i| {
+                    let linear = areas[i] * (values[i] + values[i + 1]) / 2.0;
+                    if linear > 0.0 { light[i] / linear } else { 1.0 }
+                })
+                .collect();
+            for (i, value) in values.iter_mut().enumerate() {
+                *value *= (ratio[i.saturating_sub(1)] + ratio[i.min(reached - 1)]) / 2.0;
+            }
+        }
+        values[reached] += 2.0 * profile.pencil() / areas[reached - 1];
+        let mut within = vec![inner];
+        for i in 0..reached {
+            within.push(within[i] + areas[i] * (values[i] + values[i + 1]) / 2.0);
+        }
+        let total = profile.total().mean;
+        let scale = total / within[reached];
+        values.iter_mut().chain(&mut within).for_each(|x| *x *= scale);
+        values.resize(self.cells as usize + 1, 0.0);
+        within.resize(self.cells as usize + 1, total);
+        Column { total, slope: profile.slope(), values, within }
+    }
+}
+
+/// The radius 2^(i/2 - 1), whose diameter ends a cell.
+pub fn sphere(exponent: i32) -> f64 {
+    2f64.powf(f64::from(exponent) / 2.0 - 1.0)
+}

@@ -1,0 +1,138 @@
+//! The tabulated profile: against independent simulations, its sampler, its store.
+
+use glam::DVec3;
+use std::f64::consts::PI;
+use translucent::reference::math::integrate;
+use translucent::reference::profile::{Coefficients, Matter, Options, Profile, draw_radius, plane_density, shapes, tabulated};
+use translucent::settings::Normalisation;
+use translucent::shared::MODEL_TABLE;
+
+const OPTIONS: Options = Options { normalisation: Normalisation::Energy, radius_tail: 1e-4 };
+
+fn matter(sigma_s_prime: f64, sigma_a: f64, ior: f64) -> Coefficients {
+    Coefficients { sigma_s_prime, sigma_a, g: 0.0, ior, appearance: None }
+}
+
+/// Independent Monte Carlo: a pencil of light that entered along the normal into a half-space with a smooth boundary,
+/// isotropic scattering; exitance between two radii [mm] with its standard error [1/mm^2].
+struct Searchlight {
+    sigma_s: f64,
+    sigma_a: f64,
+    ior: f64,
+    total: f64,
+    rings: &'static [[f64; 4]],
+}
+
+const MARBLE: Searchlight = Searchlight { sigma_s: 2.62, sigma_a: 0.0041, ior: 1.5, total: 0.799655, rings: &[
+    [0.0, 0.00133352, 190.24, 2.6],
+    [0.00133352, 0.00191095, 77.012, 1.4],
+    [0.00191095, 0.00273842, 52.548, 0.86],
+    [0.00273842, 0.00392419, 36.194, 0.52],
+    [0.00392419, 0.00562341, 25.566, 0.31],
+    [0.00562341, 0.00805842, 16.899, 0.18],
+    [0.00805842, 0.0115478, 11.597, 0.091],
+    [0.0115478, 0.0165482, 7.7739, 0.054],
+    [0.0165482, 0.0237137, 5.0317, 0.032],
+    [0.0237137, 0.0339821, 3.2988, 0.018],
+    [0.0339821, 0.0486968, 2.1315, 0.0087],
+    [0.0486968, 0.0697831, 1.3481, 0.0055],
+    [0.0697831, 0.1, 0.84914, 0.003],
+    [0.1, 0.143301, 0.53168, 0.0016],
+    [0.143301, 0.205353, 0.33612, 0.00099],
+    [0.205353, 0.294273, 0.21658, 0.00052],
+    [0.294273, 0.421697, 0.1411, 0.00028],
+    [0.421697, 0.604296, 0.091689, 0.00018],
+    [0.604296, 0.865964, 0.05775, 0.0001],
+    [0.865964, 1.24094, 0.034207, 4.3e-05],
+    [1.24094, 1.77828, 0.01862, 2.3e-05],
+    [1.77828, 2.5483, 0.0090695, 1.3e-05],
+    [2.5483, 3.65174, 0.0039127, 5.1e-06],
+    [3.65174, 5.23299, 0.0014784, 2.2e-06],
+    [5.23299, 7.49894, 0.00048388, 8.5e-07],
+    [7.49894, 10.7461, 0.0001341, 2.7e-07],
+    [10.7461, 15.3993, 3.0313e-05, 8.1e-08],
+    [15.3993, 22.0673, 5.1672e-06, 2.2e-08],
+    [22.0673, 31.6228, 5.9633e-07, 3.6e-09],
+    [31.6228, 45.3158, 3.8244e-08, 5.6e-10],
+    [45.3158, 64.9382, 1.2477e-09, 6.7e-11],
+    [64.9382, 93.0572, 1.0151e-11, 4.6e-12],
+] };
+
+const SKIN: Searchlight = Searchlight { sigma_s: 0.74, sigma_a: 0.032, ior: 1.3, total: 0.439431, rings: &[
+    [0.0, 0.00133352, 65.458, 0.92],
+    [0.00133352, 0.00191095, 27.232, 0.44],
+    [0.00191095, 0.00273842, 18.674, 0.25],
+    [0.00273842, 0.00392419, 12.633, 0.15],
+    [0.00392419, 0.00562341, 9.0203, 0.091],
+    [0.00562341, 0.00805842, 6.2054, 0.056],
+    [0.00805842, 0.0115478, 4.2115, 0.031],
+    [0.0115478, 0.0165482, 2.8778, 0.018],
+    [0.0165482, 0.0237137, 1.9742, 0.011],
+    [0.0237137, 0.0339821, 1.3551, 0.0067],
+    [0.0339821, 0.0486968, 0.9136, 0.0037],
+    [0.0486968, 0.0697831, 0.61125, 0.0017],
+    [0.0697831, 0.1, 0.39872, 0.0011],
+    [0.1, 0.143301, 0.26121, 0.00066],
+    [0.143301, 0.205353, 0.16745, 0.00033],
+    [0.205353, 0.294273, 0.10586, 0.00018],
+    [0.294273, 0.421697, 0.065912, 0.0001],
+    [0.421697, 0.604296, 0.040166, 5.4e-05],
+    [0.604296, 0.865964, 0.024392, 3.1e-05],
+    [0.865964, 1.24094, 0.014587, 1.6e-05],
+    [1.24094, 1.77828, 0.0085973, 7.9e-06],
+    [1.77828, 2.5483, 0.0048635, 4.1e-06],
+    [2.5483, 3.65174, 0.0025242, 2e-06],
+    [3.65174, 5.23299, 0.001145, 8.5e-07],
+    [5.23299, 7.49894, 0.00042754, 3.3e-07],
+    [7.49894, 10.7461, 0.00012174, 1.2e-07],
+    [10.7461, 15.3993, 2.447e-05, 3.3e-08],
+    [15.3993, 22.0673, 3.0725e-06, 6.9e-09],
+    [22.0673, 31.6228, 2.0717e-07, 1.1e-09],
+    [31.6228, 45.3158, 5.9754e-09, 1.1e-10],
+    [45.3158, 64.9382, 5.2134e-11, 7.3e-12],
+] };
+
+#[test]
+fn searchlight_is_that_of_an_independent_monte_carlo() {
+    for light in [&MARBLE, &SKIN] {
+        let profile = Profile::new(MODEL_TABLE, &matter(light.sigma_s, light.sigma_a, light.ior));
+        let (mut difference, mut energy) = (0.0, 0.0);
+        for &[r0, r1, expected, error] in light.rings {
+            let area = PI * (r1 * r1 - r0 * r0);
+            let mean = integrate(r0, r1, 1, |r| 2.0 * PI * r * profile.rd(r)) / area;
+            assert!((mean - expected).abs() < 5.0 * error + 0.015 * expected, "{r0}: {mean} for {expected} +- {error}");
+            difference += area * (mean - expected).abs();
+            energy += area * expected;
+        }
+        // Its own noise and ours, some .3 % each.
+        assert!(difference / energy < 0.01, "{}", difference / energy);
+        assert!((profile.total() - light.total).abs() < 0.003 * light.total, "{} for {}", profile.total(), light.total);
+    }
+}
+
+#[test]
+fn density_is_that_of_the_drawn_radii() {
+    let channels = [matter(2.62, 0.0041, 1.5), matter(1.0, 0.5, 1.5), matter(0.3, 3.0, 1.5)];
+    let mut tables = vec![];
+    let material = tabulated(&channels, OPTIONS, &[], &mut tables);
+    let matter = Matter { material: &material, tables: &tables, curvature: 0.0 };
+    // The distribution of drawn radii is the integral of the density.
+    let draws = 4096;
+    for limit in [0.003, 0.1, 0.7, 2.0, 10.0] {
+        let below = (0..draws)
+            .flat_map(|i| (0..3).map(move |c| ((c as f64 + 0.5) / 3.0, (i as f64 + 0.5) / draws as f64)))
+            .filter(|&(component, u)| draw_radius(matter, component, u) < limit)
+            .count() as f64
+            / (3 * draws) as f64;
+        let integral = integrate((1e-9f64).ln(), f64::ln(limit), 60, |x| {
+            2.0 * PI * (2.0 * x).exp() * plane_density(matter, x.exp())
+        });
+        assert!((below - integral).abs() < 1.0 / draws as f64 + 2e-5, "{limit}: {below} for {integral}");
+    }
+    // On a plane every sample weighs the same in its own channel.
+    for r in [1e-4, 0.01, 0.5, 3.0] {
+        let weights = material.strength.as_dvec3() * shapes(matter, r) / plane_density(matter, r);
+        assert!(weights.max_element() <= 3.0 * material.strength.max_element() as f64 * 1.0001, "{weights}");
+        assert!(weights.cmpge(DVec3::ZERO).all());
+    }
+}
