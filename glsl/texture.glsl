@@ -111,10 +111,15 @@ Material textured_medium(Material m, uint triangle, vec2 barycentric) {
     vec3 f = at - node;
     for (int c = 0; c < 3; c++) {
         uint i = m.ramp + uint(node[c]);
-        m.sigma_tr[c] = mix(materials[i].sigma_tr[c], materials[i + 1u].sigma_tr[c], f[c]);
-        m.z_real[c] = mix(materials[i].z_real[c], materials[i + 1u].z_real[c], f[c]);
-        m.z_virtual[c] = mix(materials[i].z_virtual[c], materials[i + 1u].z_virtual[c], f[c]);
-        m.strength[c] = mix(materials[i].strength[c], materials[i + 1u].strength[c], f[c]);
+#define BETWEEN(field) m.field[c] = mix(materials[i].field[c], materials[i + 1u].field[c], f[c])
+        BETWEEN(sigma_tr);
+        BETWEEN(z_real);
+        BETWEEN(z_virtual);
+        BETWEEN(fluence);
+        BETWEEN(height);
+        BETWEEN(free_path2);
+        BETWEEN(beam);
+        BETWEEN(strength);
     }
     return m;
 }

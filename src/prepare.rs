@@ -5,13 +5,14 @@ use crate::{
     model,
     reference::{
         Inputs, emitter, light,
-        profile::{self, Coefficients},
+        profile::{self, Coefficients, Dipole, Radial},
+        texture,
     },
-    scene::{Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene},
+    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap},
     settings::{Projection, Settings},
     shared::{self, Emitter, Features, Light, Material, TRANSLUCENT, TWO_SIDED, Texture, View},
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Everything that kernels read and that a scene and its settings determine, but for the geometry.
 #[derive(Clone, Debug)]
@@ -116,11 +117,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     }
 
     let mut profiles = vec![];
-    let materials = scene
-        .materials
-        .iter()
-        .map(|m| material(m, scene.frame, settings, &mut profiles))
-        .collect::<Result<Vec<_>>>()?;
+    let materials = materials(scene, settings, &mut profiles)?;
     let frame = scene.frame;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
@@ -161,6 +158,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         return Err(Error::setting("environment", problem));
     }
 
+    let (texels, textures, kinds) = textures(scene);
     let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_some() == flag);
     let rough = scene.materials.iter().any(|m| m.roughness > 0.0);
     let translucent = materials.iter().filter(|material| material.flags & TRANSLUCENT != 0);
@@ -172,6 +170,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         batches: u32::from(settings.variance),
         models,
         emitters: u32::from(emits),
+        textures: kinds,
         ..Features::default()
     };
     Ok(Prepared {
@@ -190,8 +189,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         emitter_cdf,
         environment,
         environment_cdf,
-        texels: vec![],
-        textures: vec![],
+        texels,
+        textures,
         profiles,
         thickness: vec![],
         camera,
@@ -264,8 +263,97 @@ fn coefficients(medium: &Medium, ior: f64, scale: f64, c: usize) -> Coefficients
 /// probe that runs within a triangle's plane meets no rounding of its distance that looks like a hit far away.
 pub const SET_DIAMETER: f32 = 2.000_01;
 
+/// Materials in the scene's order, then the ramps of those that have one.
+fn materials(scene: &Scene, settings: &Settings, profiles: &mut Vec<f32>) -> Result<Vec<Material>> {
+    let each = |m: &scene::Material| material(m, scene.frame, settings, profiles);
+    let mut out = scene.materials.iter().map(each).collect::<Result<Vec<_>>>()?;
+    for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
+        out[index].ramp = out.len() as u32;
+        let whole = out[index];
+        if whole.model == shared::MODEL_TABLE {
+            out.extend(totals(authored).map(|total| Material { strength: whole.strength * total, ..whole }));
+            continue;
+        }
+        let first = out.len();
+        for medium in &authored.ramp {
+            let node = scene::Material { medium: Some(medium.clone()), ..authored.clone() };
+            out.push(material(&node, scene.frame, settings, profiles)?);
+        }
+        // Black matter has no lengths of its own.
+        let mut next = out[first + 1];
+        let black = &mut out[first];
+        for c in 0..3 {
+            if black.strength[c] == 0.0 {
+                texture::medium_fields().iter().for_each(|field| field(black)[c] = field(&mut next)[c]);
+                black.strength[c] = 0.0;
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Totals along a ramp over that at its end. A tabulated profile keeps its shape there: one for each share of the colour
+/// would have to be simulated; its total falls as that of the standard dipole.
+fn totals(authored: &scene::Material) -> impl Iterator<Item = Vec3> {
+    let total = |medium: &Medium| {
+        DVec3::from([0, 1, 2].map(|c| {
+            let Coefficients { sigma_s_prime, sigma_a, ior, .. } = Coefficients::of(medium, authored.ior, c);
+            Dipole::new(sigma_s_prime, sigma_a, ior).total()
+        }))
+    };
+    let end = authored.ramp.last().map_or(DVec3::ONE, total);
+    authored.ramp.iter().map(move |medium| {
+        let share = total(medium) / end;
+        DVec3::select(end.cmpgt(DVec3::ZERO), share, DVec3::ZERO).as_vec3()
+    })
+}
+
+/// Texels, textures and the set of their kinds, as kernels read them; nothing without textures.
+fn textures(scene: &Scene) -> (Vec<u32>, Vec<Texture>, u32) {
+    if !scene.materials.iter().any(scene::Material::is_textured) {
+        return (vec![], vec![], 0);
+    }
+    let mut texels: Vec<u32> = (0..=255).map(|byte| (texture::decode(byte) as f32).to_bits()).collect();
+    let mut offsets = vec![];
+    for picture in &scene.pictures {
+        offsets.push(texels.len() as u32);
+        texels.extend(&picture.texels);
+    }
+    let mut kinds = 0;
+    let mut textures = vec![];
+    for (kind, authored) in scene.materials.iter().flat_map(|material| (0u32..).zip(&material.textures)) {
+        let Some(authored) = authored else {
+            textures.push(Texture::default());
+            continue;
+        };
+        kinds |= 1 << kind;
+        let picture = &scene.pictures[authored.picture];
+        let color =
+            matches!(kind, shared::TEXTURE_BASE_COLOR | shared::TEXTURE_EMISSION | shared::TEXTURE_SCATTER_COLOR);
+        let [wrap_u, wrap_v] = authored.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => shared::WRAP_REPEAT,
+            Wrap::Clamp => shared::WRAP_CLAMP,
+            Wrap::Mirror => shared::WRAP_MIRROR,
+        });
+        textures.push(Texture {
+            width: picture.width,
+            height: picture.height,
+            offset: offsets[authored.picture],
+            srgb: u32::from(color),
+            wrap_u,
+            wrap_v,
+            linear: u32::from(!authored.nearest),
+            set: authored.set,
+            row_u: authored.rows[0].as_vec3(),
+            row_v: authored.rows[1].as_vec3(),
+            scale: authored.scale as f32,
+        });
+    }
+    (texels, textures, kinds)
+}
+
 fn material(
-    material: &crate::scene::Material,
+    material: &scene::Material,
     frame: Frame,
     settings: &Settings,
     profiles: &mut Vec<f32>,
@@ -294,6 +382,10 @@ fn material(
             out
         }
     };
+    if material.tinted {
+        // Light is tinted where it enters and where it leaves.
+        out.strength *= (material.base_color * material.base_color).as_vec3();
+    }
     out.ior = material.ior as f32;
     let alpha = material.roughness * material.roughness;
     out.alpha = if alpha < f64::from(shared::MIRROR_ALPHA) { 0.0 } else { alpha as f32 };

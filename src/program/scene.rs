@@ -6,7 +6,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings,
-    scene::{Environment, EnvironmentMap},
+    scene::{AlbedoMapping, Environment, EnvironmentMap},
 };
 
 #[derive(clap::Args)]
@@ -49,6 +49,10 @@ pub struct SceneOptions {
     /// Gives a material of the file the properties of a preset (see `presets`); may be repeated.
     #[arg(long, value_name = "NAME=PRESET", value_parser = arguments::material)]
     material: Vec<(String, String)>,
+    /// What the multi-scatter colour of glTF's scattering extensions is: the albedo of matter without a boundary that
+    /// reflects, as the drafts have it, or the colour that is seen.
+    #[arg(long, default_value = "gltf", value_parser = albedo_mappings())]
+    albedo_mapping: AlbedoMapping,
     /// What one unit of the file's geometry is: m, cm, mm, 29.2mm.
     #[arg(long, value_name = "LENGTH", default_value = "m", value_parser = arguments::unit)]
     unit: f64,
@@ -77,10 +81,18 @@ pub fn models() -> impl TypedValueParser<Value = Model> {
         .map(|name| name.parse().expect("the parser passes names alone"))
 }
 
+fn albedo_mappings() -> impl TypedValueParser<Value = AlbedoMapping> {
+    PossibleValuesParser::new(["gltf", "surface"]).map(|name| match name.as_str() {
+        "surface" => AlbedoMapping::Surface,
+        _ => AlbedoMapping::Gltf,
+    })
+}
+
 impl SceneOptions {
     /// The scene with its environment, and what a user should know about it.
     pub fn load(&self) -> translucent::Result<(Scene, Vec<String>)> {
-        let options = LoadOptions { unit: self.unit, materials: self.material.clone() };
+        let options =
+            LoadOptions { unit: self.unit, materials: self.material.clone(), albedo_mapping: self.albedo_mapping };
         let mut scene = Scene::load_with(&self.file, &options)?;
         let mut environment = match &self.environment {
             Some(EnvironmentSource::Constant(radiance)) => Some(Environment::constant(DVec3::from_array(*radiance))?),

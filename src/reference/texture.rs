@@ -157,20 +157,30 @@ pub fn medium(inputs: &Inputs, material: &Material, triangle: u32, barycentric: 
     medium_at(material, nodes, share)
 }
 
+/// What a medium determines of each channel of a material.
+pub fn medium_fields() -> [fn(&mut Material) -> &mut Vec3; 8] {
+    [
+        |m| &mut m.sigma_tr,
+        |m| &mut m.z_real,
+        |m| &mut m.z_virtual,
+        |m| &mut m.fluence,
+        |m| &mut m.height,
+        |m| &mut m.free_path2,
+        |m| &mut m.beam,
+        |m| &mut m.strength,
+    ]
+}
+
 /// The material with its medium at a share of its multi-scatter colour, between two of the nodes of its ramp.
 pub fn medium_at(material: &Material, nodes: &[Material], share: DVec3) -> Material {
     let mut out = *material;
     for c in 0..3 {
         let at = share[c].clamp(0.0, 1.0) * f64::from(RAMP);
         let node = (at as usize).min(RAMP as usize - 1);
-        let between = |field: fn(&Material) -> Vec3| {
-            let (a, b) = (f64::from(field(&nodes[node])[c]), f64::from(field(&nodes[node + 1])[c]));
-            (a + (b - a) * (at - node as f64)) as f32
-        };
-        out.sigma_tr[c] = between(|m| m.sigma_tr);
-        out.z_real[c] = between(|m| m.z_real);
-        out.z_virtual[c] = between(|m| m.z_virtual);
-        out.strength[c] = between(|m| m.strength);
+        for field in medium_fields() {
+            let [a, b] = [nodes[node], nodes[node + 1]].map(|mut node| f64::from(field(&mut node)[c]));
+            field(&mut out)[c] = (a + (b - a) * (at - node as f64)) as f32;
+        }
     }
     out
 }

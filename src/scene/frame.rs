@@ -40,16 +40,27 @@ pub(super) fn around(file: &Path, triangles: &[Triangle], materials: &[Material]
     Ok(Frame { centre, scale: 1.0 / radius })
 }
 
-/// The geometry in internal units, and the count of triangles too small for them.
+/// The geometry in internal units.
+pub(super) struct Internal {
+    pub triangles: Vec<shared::Triangle>,
+    pub shadings: Vec<shared::Shading>,
+    pub coordinates: Vec<shared::Coordinates>,
+    /// Triangles that were left out.
+    pub too_small: u64,
+}
+
+/// The geometry in internal units, without triangles too small for them. `coordinates` are none or one each.
 pub(super) fn internal(
     file: &Path,
     frame: &Frame,
     triangles: &[Triangle],
-) -> Result<(Vec<shared::Triangle>, Vec<shared::Shading>, u64)> {
+    coordinates: &[shared::Coordinates],
+) -> Result<Internal> {
     let mut kept = Vec::with_capacity(triangles.len());
     let mut shadings = Vec::with_capacity(triangles.len());
+    let mut kept_coordinates = Vec::with_capacity(coordinates.len());
     let mut dropped = 0;
-    for triangle in triangles {
+    for (index, triangle) in triangles.iter().enumerate() {
         for vertex in vertices(triangle) {
             let reach = ((vertex - frame.centre) * frame.scale).abs().max_element();
             if reach > COORDINATE_MAX {
@@ -64,6 +75,7 @@ pub(super) fn internal(
             dropped += 1;
             continue;
         }
+        kept_coordinates.extend(coordinates.get(index));
         kept.push(shared::Triangle { corner, edge1, edge2, set: triangle.set });
         let [normal0, normal1, normal2]: [Vec3; 3] = triangle.normals;
         shadings.push(shared::Shading { normal0, normal1, normal2, material: triangle.material });
@@ -71,7 +83,7 @@ pub(super) fn internal(
     if kept.is_empty() {
         return Err(Error::scene(file, "scene", "has no triangle large enough for its size"));
     }
-    Ok((kept, shadings, dropped))
+    Ok(Internal { triangles: kept, shadings, coordinates: kept_coordinates, too_small: dropped })
 }
 
 /// Refuses lights and cameras whose internal numbers f32 could not hold.

@@ -5,25 +5,30 @@
 
 use super::accessor::Arrays;
 use super::json::{Item, shorten};
-use super::mesh::{self, Instance, Meshes};
-use super::{Camera, Lens, Light, LightKind, LoadOptions, Material, Set, material};
+use super::mesh::{self, Finished, Instance, Meshes};
+use super::texture::Textures;
+use super::{Camera, Lens, Light, LightKind, LoadOptions, Material, Picture, Set, material, picture, skin};
+use crate::shared::Coordinates;
 use crate::{Error, Result};
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
-use std::{borrow::Cow, path::Path};
+use std::{borrow::Cow, collections::BTreeMap, path::Path};
 
 /// What a file holds, in metres.
 pub(super) struct Raw {
     pub triangles: Vec<mesh::Triangle>,
+    /// One for each triangle, or none without textures.
+    pub coordinates: Vec<Coordinates>,
     pub dropped: u64,
     pub materials: Vec<Material>,
+    pub pictures: Vec<Picture>,
     pub sets: Vec<Set>,
     pub lights: Vec<Light>,
     pub cameras: Vec<Camera>,
     pub warnings: Vec<String>,
 }
 
-/// Extensions that a file may require: their effect is modelled, or a warning at the material says what is not.
+/// Extensions that a file may require: their effect is modelled, or a word where they are used says what is not.
 const SUPPORTED: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_ior",
@@ -34,14 +39,17 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_diffuse_transmission",
     "KHR_materials_emissive_strength",
     "KHR_mesh_quantization",
-];
-
-/// Extensions that a file may require though they are left out: the matter and its shape are right without them.
-const LEFT_OUT: &[&str] = &[
     "KHR_texture_transform",
     "KHR_texture_basisu",
     "EXT_texture_webp",
     "EXT_texture_avif",
+    "KHR_draco_mesh_compression",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+];
+
+/// Extensions that a file may require though they are left out: the matter and its shape are right without them.
+const LEFT_OUT: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_clearcoat",
     "KHR_materials_sheen",
@@ -50,9 +58,6 @@ const LEFT_OUT: &[&str] = &[
     "KHR_materials_dispersion",
     "KHR_materials_variants",
 ];
-
-/// Extensions that compress geometry, which this program cannot decode.
-const COMPRESSIONS: &[&str] = &["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// Largest coordinate that a transform may give [units of the file].
 const COORDINATE_MAX: f64 = 1e30;
@@ -71,33 +76,39 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
 
     let materials = root.list("materials")?;
     material::check_overrides(file, &materials, &options.materials)?;
+    let textures = Textures::new(&root)?;
     let mut materials: Vec<Material> = materials
         .iter()
         .enumerate()
-        .map(|(index, item)| material::read(item, index, &options.materials, &mut warnings))
+        .map(|(index, item)| material::read(item, index, &textures, options, &mut warnings))
         .collect::<Result<_>>()?;
-    let default_material = materials.len();
     materials.push(material::default_material());
 
     let arrays = Arrays::new(&root, binary.as_deref())?;
     let nodes = root.list("nodes")?;
     let transforms = place_nodes(&root, &nodes, &mut warnings)?;
-    let mut meshes = Meshes::new(&root, &arrays, default_material)?;
+    let mut meshes = Meshes::new(&root, &arrays, &materials)?;
     let mut lights = Vec::new();
     let mut cameras = Vec::new();
     for (index, (node, transform)) in nodes.iter().zip(&transforms).enumerate() {
         let Some(transform) = transform else { continue };
         let name = node.name()?;
         if let Some(reference) = node.get("mesh")? {
-            if node.get("skin")?.is_some() {
-                warnings.push(node.note("skins are not modelled; the mesh is shown in its rest pose"));
-            }
+            let joints = match node.get("skin")? {
+                None => None,
+                Some(reference) => {
+                    let list = root.list("skins")?;
+                    let item = &list[reference.index(list.len(), "skins")?];
+                    Some(skin::joint_matrices(item, &arrays, &nodes, &transforms)?)
+                }
+            };
             if let Some(instancing) = node.extension("EXT_mesh_gpu_instancing")? {
                 warnings.push(instancing.note("instances are not modelled; the mesh is shown once"));
             }
             let name = name.clone().unwrap_or_else(|| format!("node {index}"));
             let set = read_set(node)?;
-            meshes.place(&Instance { node, name, set, transform, unit: options.unit }, &reference, &mut warnings)?;
+            let instance = Instance { node, name, set, transform, unit: options.unit, joints };
+            meshes.place(&instance, &reference, &mut warnings)?;
         }
         if let Some(reference) = node.get("camera")? {
             let list = root.list("cameras")?;
@@ -113,12 +124,36 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
             lights.push(read_light(node, item, name, transform, options.unit)?);
         }
     }
-    let (triangles, sets, dropped) = meshes.finish(file, &mut materials, &mut warnings)?;
+    let Finished { triangles, coordinates, sets, dropped } = meshes.finish(file, &mut materials, &mut warnings)?;
     if triangles.is_empty() {
         let dropped = if dropped == 0 { String::new() } else { format!(" but {dropped} of zero area") };
         return Err(Error::scene(file, "scene", format!("has no triangles{dropped}")));
     }
-    Ok(Raw { triangles, dropped, materials, sets, lights, cameras, warnings })
+    let pictures = read_pictures(&root, &arrays, &mut materials)?;
+    Ok(Raw { triangles, coordinates, dropped, materials, pictures, sets, lights, cameras, warnings })
+}
+
+/// The pictures that the materials' textures show, which are numbered anew.
+fn read_pictures(root: &Item, arrays: &Arrays, materials: &mut [Material]) -> Result<Vec<Picture>> {
+    let list = root.list("images")?;
+    let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut pictures: Vec<Picture> = Vec::new();
+    for texture in materials.iter_mut().flat_map(|material| material.textures.iter_mut()).flatten() {
+        texture.picture = match numbers.get(&texture.picture) {
+            Some(number) => *number,
+            None => {
+                let item = &list[texture.picture];
+                pictures.push(picture::read(item, arrays)?);
+                let texels: usize = pictures.iter().map(|picture| picture.texels.len()).sum();
+                if texels > picture::SCENE_TEXELS_MAX {
+                    return Err(item.error(format!("the scene has more than {} texels", picture::SCENE_TEXELS_MAX)));
+                }
+                numbers.insert(texture.picture, pictures.len() - 1);
+                pictures.len() - 1
+            }
+        };
+    }
+    Ok(pictures)
 }
 
 /// JSON text and binary chunk of a file.
@@ -148,12 +183,6 @@ fn check_asset(root: &Item, warnings: &mut Vec<String>) -> Result<()> {
     }
     for required in root.list("extensionsRequired")? {
         let name = required.string()?;
-        if COMPRESSIONS.contains(&name) {
-            return Err(required.error(format!(
-                "{name} is not supported: decode the file first, for example by importing it into Blender and \
-                 exporting it without compression"
-            )));
-        }
         if !SUPPORTED.contains(&name) && !LEFT_OUT.contains(&name) {
             return Err(required.error(format!("the required extension {} is not supported", shorten(name))));
         }
@@ -162,7 +191,7 @@ fn check_asset(root: &Item, warnings: &mut Vec<String>) -> Result<()> {
         let name = used.string()?;
         // Materials and nodes say themselves what is left out of them.
         let told = name == "EXT_mesh_gpu_instancing" || material::UNMODELLED.iter().any(|(known, _)| *known == name);
-        if !SUPPORTED.contains(&name) && !COMPRESSIONS.contains(&name) && !told {
+        if !SUPPORTED.contains(&name) && !told {
             warnings.push(used.note(format!("the extension {} is not modelled", shorten(name))));
         }
     }

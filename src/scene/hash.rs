@@ -26,7 +26,7 @@ impl Feed {
 /// other names, the file's place and warnings do not. The BVH follows from the triangles and their order.
 pub(super) fn hash(scene: &Scene) -> String {
     let mut feed = Feed(Sha256::new());
-    feed.bytes(b"translucent scene 1");
+    feed.bytes(b"translucent scene 2");
     feed.numbers(scene.frame.centre.to_array());
     feed.numbers([scene.frame.scale]);
     feed.bytes(bytemuck::cast_slice(&scene.triangles));
@@ -38,7 +38,7 @@ pub(super) fn hash(scene: &Scene) -> String {
         feed.numbers(material.emission.to_array());
         feed.count(usize::from(material.two_sided));
         feed.count(usize::from(material.medium.is_some()));
-        if let Some(medium) = &material.medium {
+        for medium in material.medium.iter().chain(&material.ramp) {
             feed.numbers(medium.sigma_s_prime.to_array());
             feed.numbers(medium.sigma_a.to_array());
             feed.numbers(medium.g.to_array());
@@ -49,7 +49,22 @@ pub(super) fn hash(scene: &Scene) -> String {
                 feed.count(appearance.kind as usize);
             }
         }
+        feed.count(usize::from(material.tinted));
+        for (kind, texture) in material.textures.iter().enumerate() {
+            let Some(texture) = texture else { continue };
+            feed.count(kind);
+            feed.count(texture.picture);
+            feed.numbers([f64::from(texture.set), f64::from(u8::from(texture.nearest)), texture.scale]);
+            feed.numbers(texture.wrap.map(|wrap| f64::from(wrap as u8)));
+            texture.rows.iter().for_each(|row| feed.numbers(row.to_array()));
+        }
     }
+    feed.count(scene.pictures.len());
+    for picture in &scene.pictures {
+        feed.numbers([f64::from(picture.width), f64::from(picture.height)]);
+        feed.bytes(bytemuck::cast_slice(&picture.texels));
+    }
+    feed.bytes(bytemuck::cast_slice(&scene.coordinates));
     feed.count(scene.lights.len());
     for light in &scene.lights {
         feed.numbers(light.position.to_array());

@@ -4,8 +4,14 @@ use super::frame::INTENSITY_MAX;
 use super::json::Item;
 use super::medium::{self, Mapping};
 use super::presets::{Preset, preset};
+use super::scattering::{Authored, warn_of_clear_matter};
+use super::texture::Textures;
 use super::unit::metres;
-use super::{Appearance, LengthKind, Material, Medium};
+use super::{Appearance, LengthKind, LoadOptions, Material, Medium, Texture};
+use crate::shared::{
+    RAMP, TEXTURE_ALPHA, TEXTURE_BASE_COLOR, TEXTURE_EMISSION, TEXTURE_METALLIC_ROUGHNESS, TEXTURE_NORMAL,
+    TEXTURE_SCATTER_COLOR, TEXTURE_SCATTER_STRENGTH,
+};
 use crate::{Error, Result, settings::Model};
 use glam::DVec3;
 use std::path::Path;
@@ -14,11 +20,9 @@ use std::path::Path;
 const DEFAULT_IOR: f64 = 1.5;
 /// Indices of refraction within which the Fresnel moments keep their digits.
 const IOR_RANGE: (f64, f64) = (0.1, 10.0);
-/// Stands for an attenuation colour of 0, which would be an infinite extinction.
-const DARKEST_ATTENUATION: f64 = 1e-4;
 /// Longest mean free path (m) and largest coefficient [1/m]: beyond, f32 kernels cannot hold the numbers.
 const COEFFICIENT_MAX: f64 = 1e12;
-const LENGTH_RANGE: (f64, f64) = (1e-12, 1e12);
+pub(super) const LENGTH_RANGE: (f64, f64) = (1e-12, 1e12);
 
 /// Reduced albedo below which diffusion theory is far from the truth.
 const DIFFUSION_ALBEDO_MIN: f64 = 0.5;
@@ -66,24 +70,29 @@ pub(super) fn default_material() -> Material {
         ior: DEFAULT_IOR,
         medium: None,
         set: None,
+        tinted: false,
+        ramp: Vec::new(),
+        textures: Default::default(),
+        hidden: false,
     }
 }
 
-/// Reads `materials[index]`. The medium is the first of: a preset in `overrides` for the material's name,
+/// Reads `materials[index]`. The medium is the first of: a preset among the options for the material's name,
 /// `extras.bssrdf`, KHR_materials_scatter, KHR_materials_volume_scatter, none.
-pub(super) fn read(
-    item: &Item,
+pub(super) fn read<'a>(
+    item: &Item<'a>,
     index: usize,
-    overrides: &[(String, String)],
+    textures: &Textures<'a>,
+    options: &LoadOptions,
     warnings: &mut Vec<String>,
 ) -> Result<Material> {
     let name = item.name()?.unwrap_or_else(|| format!("material {index}"));
     let mut material = Material { name, ..default_material() };
-    read_surface(item, &mut material, warnings)?;
+    read_surface(item, textures, &mut material, warnings)?;
     let authored_ior = read_ior(item, warnings)?;
     material.ior = authored_ior.unwrap_or(DEFAULT_IOR);
 
-    let chosen = overrides.iter().rev().find(|(name, _)| *name == material.name);
+    let chosen = options.materials.iter().rev().find(|(name, _)| *name == material.name);
     let bssrdf = extras_bssrdf(item)?;
     if let Some(bssrdf) = &bssrdf {
         material.set = read_set(bssrdf)?;
@@ -102,14 +111,22 @@ pub(super) fn read(
     } else if let Some(bssrdf) = bssrdf {
         read_bssrdf(&bssrdf, authored_ior, &mut material)?;
     } else if let Some(scatter) = scatter {
-        material.medium = read_scattering(item, &scatter, Mapping::Scatter, warnings)?;
+        read_scattering(item, &scatter, Mapping::Scatter, textures, options, &mut material, warnings)?;
     } else if let Some(scatter) = volume_scatter {
-        material.medium = read_scattering(item, &scatter, Mapping::VolumeScatter, warnings)?;
+        read_scattering(item, &scatter, Mapping::VolumeScatter, textures, options, &mut material, warnings)?;
     } else {
         warn_of_clear_matter(item, warnings)?;
     }
     if let Some(medium) = &material.medium {
         warn_of_absorption(item, medium, warnings);
+        if !material.tinted && material.textures[TEXTURE_BASE_COLOR as usize].take().is_some() {
+            let source = &medium.source;
+            warnings.push(
+                item.note(format!(
+                    "{source} brings the colour of the matter; the texture of the base colour is not used"
+                )),
+            );
+        }
     }
     Ok(material)
 }
@@ -148,21 +165,66 @@ pub(super) fn check_overrides(file: &Path, materials: &[Item], overrides: &[(Str
     Ok(())
 }
 
-fn read_surface(item: &Item, material: &mut Material, warnings: &mut Vec<String>) -> Result<()> {
-    let mut textured = item.get("normalTexture")?.is_some()
-        || item.get("occlusionTexture")?.is_some()
-        || item.get("emissiveTexture")?.is_some();
+/// A medium from either draft of the scattering extension, and its ramp where textures scale its colour.
+fn read_scattering<'a>(
+    item: &Item<'a>,
+    scatter: &Item<'a>,
+    mapping: Mapping,
+    textures: &Textures<'a>,
+    options: &LoadOptions,
+    material: &mut Material,
+    warnings: &mut Vec<String>,
+) -> Result<()> {
+    let color = textures.read(scatter, "multiscatterColorTexture")?;
+    let mut strength = None;
+    if mapping == Mapping::Scatter {
+        let first = textures.read(scatter, "scatterStrengthTexture")?;
+        strength = first.or(textures.read(scatter, "scatterTexture")?);
+    }
+    let authored = Authored::read(item, scatter, mapping, warnings)?;
+    let Some(authored) = authored else { return Ok(()) };
+    let media = |share: f64| authored.medium(share, material.ior, options.albedo_mapping);
+    material.medium = Some(media(1.0));
+    material.tinted = true;
+    if color.is_some() || strength.is_some() {
+        material.ramp = (0..=RAMP).map(|node| media(f64::from(node) / f64::from(RAMP))).collect();
+    }
+    material.textures[TEXTURE_SCATTER_COLOR as usize] = color;
+    material.textures[TEXTURE_SCATTER_STRENGTH as usize] = strength;
+    Ok(())
+}
+
+fn read_surface<'a>(
+    item: &Item<'a>,
+    textures: &Textures<'a>,
+    material: &mut Material,
+    warnings: &mut Vec<String>,
+) -> Result<()> {
+    let mut alpha = 1.0;
     if let Some(pbr) = item.get("pbrMetallicRoughness")? {
         if let Some(factor) = pbr.get("baseColorFactor")? {
-            let [r, g, b, _] = factor.numbers_within(0.0, 1.0)?;
+            let [r, g, b, a] = factor.numbers_within(0.0, 1.0)?;
             material.base_color = DVec3::new(r, g, b);
+            alpha = a;
         }
         material.metallic = pbr.get("metallicFactor")?.map_or(Ok(1.0), |factor| factor.within(0.0, 1.0))?;
         material.roughness = pbr.get("roughnessFactor")?.map_or(Ok(1.0), |factor| factor.within(0.0, 1.0))?;
-        textured |= pbr.get("baseColorTexture")?.is_some() || pbr.get("metallicRoughnessTexture")?.is_some();
+        material.textures[TEXTURE_BASE_COLOR as usize] = textures.read(&pbr, "baseColorTexture")?;
+        material.textures[TEXTURE_METALLIC_ROUGHNESS as usize] = textures.read(&pbr, "metallicRoughnessTexture")?;
     }
-    if textured {
-        warnings.push(item.note("textures are not modelled; the factors alone are used"));
+    material.textures[TEXTURE_NORMAL as usize] = textures.read(item, "normalTexture")?;
+    material.textures[TEXTURE_EMISSION as usize] = textures.read(item, "emissiveTexture")?;
+    if let Some(occlusion) = item.get("occlusionTexture")? {
+        warnings.push(occlusion.note("shadows are traced; the texture is not used"));
+    }
+    for (extension, texture) in [
+        ("KHR_materials_transmission", "transmissionTexture"),
+        ("KHR_materials_diffuse_transmission", "diffuseTransmissionTexture"),
+        ("KHR_materials_diffuse_transmission", "diffuseTransmissionColorTexture"),
+    ] {
+        if let Some(texture) = item.find(&["extensions", extension, texture])? {
+            warnings.push(texture.note("this texture is not modelled; the factor alone is used"));
+        }
     }
     if let Some(factor) = item.get("emissiveFactor")? {
         material.emission = DVec3::from_array(factor.numbers_within(0.0, 1.0)?);
@@ -176,7 +238,8 @@ fn read_surface(item: &Item, material: &mut Material, warnings: &mut Vec<String>
     if let Some(mode) = item.get("alphaMode")? {
         match mode.string()? {
             "OPAQUE" => {}
-            "MASK" | "BLEND" => {
+            "MASK" => read_mask(item, alpha, material)?,
+            "BLEND" => {
                 warnings.push(mode.note("transparency by alpha is not modelled; the surface is taken as whole"));
             }
             other => return Err(mode.error(format!("must be OPAQUE, MASK or BLEND, is {other:?}"))),
@@ -186,6 +249,20 @@ fn read_surface(item: &Item, material: &mut Material, warnings: &mut Vec<String>
         if item.extension(extension)?.is_some() {
             warnings.push(item.note(format!("{effect} ({extension}): not modelled")));
         }
+    }
+    Ok(())
+}
+
+/// The cutoff of a mask: a surface is where factor x texture is at least that.
+fn read_mask(item: &Item, factor: f64, material: &mut Material) -> Result<()> {
+    let cutoff = item.get("alphaCutoff")?.map_or(Ok(0.5), |cutoff| cutoff.within(0.0, f64::INFINITY))?;
+    match &material.textures[TEXTURE_BASE_COLOR as usize] {
+        Some(texture) if factor > 0.0 && cutoff > 0.0 => {
+            // Numbers that f32 holds; no alpha of a byte lies beyond them.
+            let scale = (factor / cutoff).clamp(1e-9, 1e9);
+            material.textures[TEXTURE_ALPHA as usize] = Some(Texture { scale, ..*texture });
+        }
+        _ => material.hidden = factor < cutoff,
     }
     Ok(())
 }
@@ -303,7 +380,7 @@ fn warn_of_absorption(item: &Item, medium: &Medium, warnings: &mut Vec<String>) 
 }
 
 /// Mean cosines, one for all channels or one each, above -1 and below 1.
-fn read_g(item: &Item) -> Result<DVec3> {
+pub(super) fn read_g(item: &Item) -> Result<DVec3> {
     let g = item.channels_within(-1.0, 1.0)?;
     if g.abs().max_element() >= 1.0 {
         return Err(item.error("must be above -1 and below 1"));
@@ -356,115 +433,4 @@ fn read_albedo(item: &Item, albedo: &Item) -> Result<Appearance> {
         return Err(length.error(format!("must be at least {} m", LENGTH_RANGE.0)));
     }
     Ok(Appearance { albedo: albedos, length: lengths, kind })
-}
-
-/// Either draft of the scattering extension, over KHR_materials_volume.
-fn read_scattering(
-    material: &Item,
-    item: &Item,
-    mapping: Mapping,
-    warnings: &mut Vec<String>,
-) -> Result<Option<Medium>> {
-    let (name, default_color) = match mapping {
-        Mapping::Scatter => ("KHR_materials_scatter", DVec3::ONE),
-        Mapping::VolumeScatter => ("KHR_materials_volume_scatter", DVec3::ZERO),
-    };
-    let color = match (item.get("multiscatterColorFactor")?, item.get("multiscatterColor")?) {
-        (Some(color), _) | (None, Some(color)) => DVec3::from_array(color.numbers_within(0.0, 1.0)?),
-        (None, None) => default_color,
-    };
-    let strength = match (mapping, item.get("scatterStrengthFactor")?, item.get("scatterFactor")?) {
-        (Mapping::VolumeScatter, ..) => 1.0,
-        (Mapping::Scatter, Some(strength), _) | (Mapping::Scatter, None, Some(strength)) => {
-            strength.within(0.0, 1.0)?
-        }
-        (Mapping::Scatter, None, None) => 0.0,
-    };
-    let g = item.get("scatterAnisotropy")?.map_or(Ok(DVec3::ZERO), |g| {
-        g.number()?;
-        read_g(&g)
-    })?;
-    for texture in ["multiscatterColorTexture", "scatterStrengthTexture", "scatterTexture"] {
-        if let Some(texture) = item.get(texture)? {
-            warnings.push(texture.note("textures are not modelled; the factor alone is used"));
-        }
-    }
-    let sigma_t = read_extinction(material, warnings)?;
-    let nothing = |reason: &str| item.note(format!("{reason}, so nothing scatters; the material is taken as opaque"));
-    let rho = color * strength;
-    if strength == 0.0 {
-        warnings.push(nothing("the scatter strength (scatterStrengthFactor, default 0) is 0"));
-        return Ok(None);
-    }
-    if rho == DVec3::ZERO {
-        warnings.push(nothing("the multi-scatter colour is black"));
-        return Ok(None);
-    }
-    if sigma_t == DVec3::ZERO {
-        warnings.push(nothing("KHR_materials_volume gives no extinction (attenuationDistance, attenuationColor)"));
-        return Ok(None);
-    }
-    warn_of_share(material, item, warnings)?;
-    let (sigma_s_prime, sigma_a) =
-        medium::channels(|channel| Ok(mapping.coefficients(sigma_t[channel], rho[channel], g[channel])))?;
-    Ok(Some(Medium { sigma_s_prime, sigma_a, g, appearance: None, model: None, source: name.into() }))
-}
-
-/// sigma_t = -ln(attenuationColor) / attenuationDistance [1/m]; 0 without KHR_materials_volume.
-fn read_extinction(material: &Item, warnings: &mut Vec<String>) -> Result<DVec3> {
-    let Some(volume) = material.extension("KHR_materials_volume")? else { return Ok(DVec3::ZERO) };
-    let thickness = volume.get("thicknessFactor")?.map_or(Ok(0.0), |thickness| thickness.within(0.0, f64::INFINITY))?;
-    if thickness == 0.0 {
-        warnings.push(volume.note("a thin wall (thicknessFactor 0) is not modelled; the matter is taken as solid"));
-    }
-    let color = volume.get("attenuationColor")?;
-    let mut factor = color.as_ref().map_or(Ok([1.0; 3]), |color| color.numbers_within(0.0, 1.0))?;
-    if let Some(color) = color.filter(|_| factor.contains(&0.0)) {
-        warnings.push(color.note(format!("0 would be an infinite extinction; {DARKEST_ATTENUATION} is used")));
-        factor = factor.map(|channel| if channel == 0.0 { DARKEST_ATTENUATION } else { channel });
-    }
-    let Some(distance) = volume.get("attenuationDistance")? else { return Ok(DVec3::ZERO) };
-    let length = distance.positive()?;
-    if !(LENGTH_RANGE.0..=LENGTH_RANGE.1).contains(&length) {
-        return Err(distance.error(format!("must be from {} to {} m, is {length}", LENGTH_RANGE.0, LENGTH_RANGE.1)));
-    }
-    // `+ 0.0` turns the -0 of a white channel into 0.
-    Ok(DVec3::from_array(factor.map(|channel| -channel.ln() / length + 0.0)))
-}
-
-/// The share of transmission in a material that scatters.
-fn warn_of_share(material: &Item, item: &Item, warnings: &mut Vec<String>) -> Result<()> {
-    let share = transmitted(material)?;
-    if share < 1.0 {
-        warnings.push(item.note(format!(
-            "a material that transmits {share} of the light is taken as wholly translucent; mixtures are not modelled"
-        )));
-    }
-    Ok(())
-}
-
-fn warn_of_clear_matter(material: &Item, warnings: &mut Vec<String>) -> Result<()> {
-    if transmitted(material)? > 0.0 {
-        warnings.push(material.note(
-            "transmits light without scattering it; refraction through clear matter is not modelled, it is opaque",
-        ));
-    }
-    // The ranges hold for matter that only absorbs, too.
-    let mut unheard = Vec::new();
-    read_extinction(material, &mut unheard)?;
-    Ok(())
-}
-
-/// The larger of the two transmission factors; 0 without their extensions.
-fn transmitted(material: &Item) -> Result<f64> {
-    let mut share: f64 = 0.0;
-    for (extension, factor) in [
-        ("KHR_materials_transmission", "transmissionFactor"),
-        ("KHR_materials_diffuse_transmission", "diffuseTransmissionFactor"),
-    ] {
-        if let Some(factor) = material.find(&["extensions", extension, factor])? {
-            share = share.max(factor.within(0.0, 1.0)?);
-        }
-    }
-    Ok(share)
 }

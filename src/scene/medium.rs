@@ -1,6 +1,6 @@
 //! Scattering coefficients from what authors write: colours, albedos, mean free paths.
 
-use super::LengthKind;
+use super::{AlbedoMapping, LengthKind};
 use crate::{Result, reference::profile::invert_total};
 use glam::DVec3;
 
@@ -14,19 +14,34 @@ pub(super) enum Mapping {
 }
 
 impl Mapping {
-    /// (sigma_s', sigma_a) of one channel from the extinction and the multi-scatter albedo.
+    /// (sigma_s', sigma_a) of one channel from the extinction and the multi-scatter colour.
     ///
-    /// With s = 4.09712 + 4.20863 rho - sqrt(9.59217 + 41.6808 rho + 17.7126 rho^2) in a form without cancellation,
-    /// and sigma_a as a product: `sigma_t * (1 - albedo)` would lose every digit near 1.
-    pub fn coefficients(self, sigma_t: f64, rho: f64, g: f64) -> (f64, f64) {
-        let b = 1.139 + 1.17 * rho;
-        let s = (2.0 * (1.0 - rho) / (b + (b * b - 0.556 * (1.0 - rho)).sqrt())).min(1.0);
-        let scattered = sigma_t * (1.0 - s) * (1.0 + s);
-        let absorbed = sigma_t * s * s;
+    /// As the drafts have it: with s = 4.09712 + 4.20863 rho - sqrt(9.59217 + 41.6808 rho + 17.7126 rho^2) in a form without cancellation,
+    /// and sigma_a as a product: `sigma_t * (1 - albedo)` would lose every digit near 1. For the colour that is seen,
+    /// s^2 is such that alpha' has the total rho instead.
+    pub fn coefficients(self, sigma_t: f64, rho: f64, g: f64, albedo: AlbedoMapping, ior: f64) -> (f64, f64) {
+        // s^2, and the parts of sigma_t.
+        let (s2, scattered, absorbed) = match albedo {
+            AlbedoMapping::Gltf => {
+                let b = 1.139 + 1.17 * rho;
+                let s = (2.0 * (1.0 - rho) / (b + (b * b - 0.556 * (1.0 - rho)).sqrt())).min(1.0);
+                (s * s, sigma_t * (1.0 - s) * (1.0 + s), sigma_t * s * s)
+            }
+            AlbedoMapping::Surface => {
+                // 1 - alpha' = e^2 / 3; of the first draft, alpha' = (1 - s^2) (1 - g) / ((1 - s^2) (1 - g) + s^2).
+                let lost = if rho > 0.0 { (invert_total(rho, ior).powi(2) / 3.0).min(1.0) } else { 1.0 };
+                let (kept, lost) = match self {
+                    Mapping::VolumeScatter => (1.0 - lost, lost * (1.0 - g)),
+                    Mapping::Scatter => (1.0 - lost, lost),
+                };
+                let s2 = lost / (kept + lost);
+                (s2, sigma_t * kept / (kept + lost), sigma_t * s2)
+            }
+        };
         match self {
             Mapping::VolumeScatter => (scattered * (1.0 - g), absorbed),
             Mapping::Scatter => {
-                let factor = (1.0 - g) / (1.0 - g * s * s);
+                let factor = (1.0 - g) / (1.0 - g * s2);
                 (scattered * factor, absorbed * factor)
             }
         }

@@ -2,10 +2,12 @@
 
 use super::accessor::Arrays;
 use super::json::Item;
+use super::primitive::{self, Needs, Primitive};
 use super::sets::{self, Group};
-use super::{Material, Set};
+use super::{Material, Set, Texture, skin};
 use crate::Result;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use crate::shared::{Coordinates, TEXTURE_NORMAL};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
@@ -32,6 +34,8 @@ pub(super) struct Triangle {
     pub set: u32,
     /// Indices of the placed vertices.
     pub vertices: [u32; 3],
+    /// Index of what textures need of it.
+    coordinates: Option<u32>,
     /// Whether its normals all pointed against its winding, and were turned.
     pub opposed: bool,
     /// Whether its winding was turned.
@@ -57,45 +61,53 @@ pub(super) struct Instance<'n, 'a> {
     pub transform: &'n DAffine3,
     /// Metres of a unit of the file.
     pub unit: f64,
-}
-
-/// A primitive as the file holds it.
-struct Primitive<'a> {
-    item: Item<'a>,
-    positions: Vec<DVec3>,
-    normals: Option<Vec<DVec3>>,
-    corners: Vec<[u32; 3]>,
-    material: usize,
+    /// The matrices of its skin's joints, which then place it and not the node's transform.
+    pub joints: Option<Vec<DAffine3>>,
 }
 
 /// Reads meshes when they are first shown, and collects triangles.
 pub(super) struct Meshes<'r, 'a> {
     arrays: &'r Arrays<'a>,
     items: Vec<Item<'a>>,
-    default_material: usize,
-    loaded: HashMap<usize, Rc<Vec<Primitive<'a>>>>,
+    /// What the textures of each material need, the default one last.
+    needs: Vec<Needs>,
+    normal_maps: Vec<Option<Texture>>,
+    hidden: Vec<bool>,
+    textured: bool,
+    loaded: HashMap<(usize, Vec<u64>, bool), Rc<Vec<Primitive<'a>>>>,
     vertices: usize,
     /// Placed vertices (m).
     positions: Vec<DVec3>,
     triangles: Vec<Triangle>,
     groups: Vec<Group>,
+    /// What textures need of triangles.
+    coordinates: Vec<Coordinates>,
     dropped: u64,
     /// Vertices of triangles below which their normal points.
     below: u64,
 }
 
 impl<'r, 'a> Meshes<'r, 'a> {
-    /// `default_material` is the index after the file's last material.
-    pub fn new(root: &Item<'a>, arrays: &'r Arrays<'a>, default_material: usize) -> Result<Self> {
+    /// `materials` are those of the file and, as the last, the default one.
+    pub fn new(root: &Item<'a>, arrays: &'r Arrays<'a>, materials: &[Material]) -> Result<Self> {
+        let needs = |material: &Material| {
+            let mut needs = Needs { tangents: normal_map(material).is_some(), ..Needs::default() };
+            material.textures.iter().flatten().for_each(|texture| needs.sets[texture.set as usize] = true);
+            needs
+        };
         Ok(Meshes {
             arrays,
             items: root.list("meshes")?,
-            default_material,
+            textured: materials.iter().any(Material::is_textured),
+            needs: materials.iter().map(needs).collect(),
+            normal_maps: materials.iter().map(normal_map).collect(),
+            hidden: materials.iter().map(|material| material.hidden).collect(),
             loaded: HashMap::new(),
             vertices: 0,
             positions: Vec::new(),
             triangles: Vec::new(),
             groups: Vec::new(),
+            coordinates: Vec::new(),
             dropped: 0,
             below: 0,
         })
@@ -104,32 +116,47 @@ impl<'r, 'a> Meshes<'r, 'a> {
     /// Adds the triangles of the mesh at `reference`, as `instance` shows it.
     pub fn place(&mut self, instance: &Instance, reference: &Item<'a>, warnings: &mut Vec<String>) -> Result<()> {
         let index = reference.index(self.items.len(), "meshes")?;
-        let primitives = match self.loaded.get(&index) {
-            Some(primitives) => primitives.clone(),
-            None => {
-                let primitives = Rc::new(self.load(index, warnings)?);
-                self.loaded.insert(index, primitives.clone());
-                primitives
-            }
+        let weights = match instance.node.get("weights")? {
+            Some(weights) => Some(weights),
+            None => self.items[index].get("weights")?,
         };
+        let weights = weights.map_or(Ok(Vec::new()), |weights| {
+            weights.elements()?.iter().map(|weight| weight.number()).collect::<Result<Vec<_>>>()
+        })?;
+        let primitives = self.load(index, &weights, instance.joints.is_some(), warnings)?;
         let mut groups: HashMap<usize, usize> = HashMap::new();
         for primitive in primitives.iter() {
+            if self.hidden[primitive.material] {
+                continue;
+            }
             let group = *groups.entry(primitive.material).or_insert_with(|| {
                 let (node, set) = (instance.name.clone(), instance.set.clone());
                 self.groups.push(Group { node, material: primitive.material, set });
                 self.groups.len() - 1
             });
-            self.place_primitive(instance, primitive, group as u32)?;
+            match &instance.joints {
+                None => self.place_primitive(instance, instance.transform, primitive, group as u32)?,
+                Some(joints) => {
+                    let posed = skin::posed(primitive, joints)?;
+                    self.place_primitive(instance, &DAffine3::IDENTITY, &posed, group as u32)?;
+                }
+            }
         }
         Ok(())
     }
 
-    fn place_primitive(&mut self, instance: &Instance, primitive: &Primitive, group: u32) -> Result<()> {
+    fn place_primitive(
+        &mut self,
+        instance: &Instance,
+        transform: &DAffine3,
+        primitive: &Primitive,
+        group: u32,
+    ) -> Result<()> {
         if self.triangles.len() + primitive.corners.len() > TRIANGLES_MAX {
             return Err(instance.node.error(format!("the scene has more than {TRIANGLES_MAX} triangles")));
         }
-        let linear = instance.transform.matrix3 * instance.unit;
-        let translation = instance.transform.translation * instance.unit;
+        let linear = transform.matrix3 * instance.unit;
+        let translation = transform.translation * instance.unit;
         let mirrored = linear.determinant() < 0.0;
         let normal_matrix = cofactors(&linear) * if mirrored { -1.0 } else { 1.0 };
         let first = self.positions.len() as u32;
@@ -169,6 +196,11 @@ impl<'r, 'a> Meshes<'r, 'a> {
                     }
                 }
             }
+            let edges = [edge1, edge2];
+            let coordinates = self.textured.then(|| {
+                self.coordinates.push(self.coordinates_of(primitive, order, &linear, mirrored, edges, geometric));
+                self.coordinates.len() as u32 - 1
+            });
             self.triangles.push(Triangle {
                 corner,
                 edge1,
@@ -177,6 +209,7 @@ impl<'r, 'a> Meshes<'r, 'a> {
                 material: primitive.material as u32,
                 set: group,
                 vertices: order.map(|vertex| first + vertex as u32),
+                coordinates,
                 opposed,
                 turned: false,
             });
@@ -184,11 +217,60 @@ impl<'r, 'a> Meshes<'r, 'a> {
         Ok(())
     }
 
-    fn load(&mut self, index: usize, warnings: &mut Vec<String>) -> Result<Vec<Primitive<'a>>> {
+    /// What textures need of the triangle of three vertices.
+    fn coordinates_of(
+        &self,
+        primitive: &Primitive,
+        order: [usize; 3],
+        linear: &DMat3,
+        mirrored: bool,
+        edges: [DVec3; 2],
+        geometric: DVec3,
+    ) -> Coordinates {
+        let mut out = Coordinates { handedness: 1.0, ..Coordinates::default() };
+        for (set, coordinates) in primitive.coordinates.iter().enumerate() {
+            let Some(coordinates) = coordinates else { continue };
+            order.iter().enumerate().for_each(|(i, &corner)| out.uv[3 * set + i] = Vec2::from(coordinates[corner]));
+        }
+        let Some(map) = &self.normal_maps[primitive.material] else { return out };
+        if let Some(tangents) = &primitive.tangents {
+            out.tangent = order.map(|corner| unit(*linear * tangents[corner].0).unwrap_or(DVec3::ZERO).as_vec3());
+            out.handedness = (tangents[order[0]].1 * if mirrored { -1.0 } else { 1.0 }) as f32;
+        } else if let Some((tangent, handedness)) = tangent(map, &out, edges, geometric) {
+            out.tangent = [tangent.as_vec3(); 3];
+            out.handedness = handedness;
+        }
+        out
+    }
+
+    /// What textures need of a triangle as it is wound in the end.
+    fn final_coordinates(&self, triangle: &Triangle) -> Option<Coordinates> {
+        let mut out = self.coordinates[triangle.coordinates? as usize];
+        out.material = triangle.material;
+        if triangle.turned {
+            [(1, 2), (4, 5)].into_iter().for_each(|(a, b)| out.uv.swap(a, b));
+            out.tangent.swap(1, 2);
+            out.handedness = -out.handedness;
+        }
+        Some(out)
+    }
+
+    /// The primitives of a mesh whose morph targets have these weights.
+    fn load(
+        &mut self,
+        index: usize,
+        weights: &[f64],
+        skinned: bool,
+        warnings: &mut Vec<String>,
+    ) -> Result<Rc<Vec<Primitive<'a>>>> {
+        let key = (index, weights.iter().map(|weight| weight.to_bits()).collect::<Vec<_>>(), skinned);
+        if let Some(primitives) = self.loaded.get(&key) {
+            return Ok(primitives.clone());
+        }
         let mesh = self.items[index].clone();
         let mut primitives = Vec::new();
         for item in mesh.need("primitives")?.elements()? {
-            if let Some(primitive) = self.load_primitive(item, warnings)? {
+            if let Some(primitive) = primitive::read(self.arrays, item, weights, skinned, &self.needs, warnings)? {
                 self.vertices = self.vertices.saturating_add(primitive.positions.len() + primitive.corners.len());
                 if self.vertices > 4 * TRIANGLES_MAX {
                     return Err(mesh.error(format!("the scene has more than {} vertices", 4 * TRIANGLES_MAX)));
@@ -196,72 +278,12 @@ impl<'r, 'a> Meshes<'r, 'a> {
                 primitives.push(primitive);
             }
         }
+        let primitives = Rc::new(primitives);
+        self.loaded.insert(key, primitives.clone());
         Ok(primitives)
     }
 
-    fn load_primitive(&self, item: Item<'a>, warnings: &mut Vec<String>) -> Result<Option<Primitive<'a>>> {
-        let mode = item.get("mode")?.map_or(Ok(4), |mode| mode.index(7, "primitive modes"))?;
-        if mode < 4 {
-            warnings.push(item.note("points and lines are not modelled; the primitive is left out"));
-            return Ok(None);
-        }
-        if item.extension("KHR_draco_mesh_compression")?.is_some() {
-            return Err(item.error(
-                "is compressed with Draco, which is not supported: decode the file first, for example by importing it \
-                 into Blender and exporting it without compression",
-            ));
-        }
-        if !item.list("targets")?.is_empty() {
-            warnings.push(item.note("morph targets are not modelled; the rest pose is shown"));
-        }
-        let attributes = item.need("attributes")?;
-        if attributes.get("COLOR_0")?.is_some() {
-            warnings.push(attributes.note("vertex colours are not modelled"));
-        }
-        let Some(positions) = attributes.get("POSITION")? else {
-            warnings.push(item.note("has no POSITION; the primitive is left out"));
-            return Ok(None);
-        };
-        let positions = self.arrays.vectors(&positions)?;
-        if let Some(vertex) = positions.iter().position(|position| !position.is_finite()) {
-            return Err(item.error(format!("the position of vertex {vertex} is {:?}", positions[vertex].to_array())));
-        }
-        let normals = attributes.get("NORMAL")?.map(|normals| self.arrays.vectors(&normals)).transpose()?;
-        if let Some(normals) = &normals {
-            if normals.len() != positions.len() {
-                let (normals, positions) = (normals.len(), positions.len());
-                return Err(item.error(format!("has {normals} normals for {positions} positions")));
-            }
-            if let Some(vertex) = normals.iter().position(|normal| !normal.is_finite()) {
-                return Err(item.error(format!("the normal of vertex {vertex} is {:?}", normals[vertex].to_array())));
-            }
-        }
-        let order = match item.get("indices")? {
-            Some(indices) => self.arrays.indices(&indices)?,
-            None => (0..u32::try_from(positions.len()).map_err(|_| item.error("has too many vertices"))?).collect(),
-        };
-        if let Some(place) = order.iter().position(|&index| index as usize >= positions.len()) {
-            let (index, count) = (order[place], positions.len());
-            return Err(item.error(format!("index {place} is {index}, but there are {count} vertices")));
-        }
-        let corners: Vec<[u32; 3]> = match mode {
-            4 if order.len() % 3 != 0 => {
-                return Err(item.error(format!("{} vertices are no whole number of triangles", order.len())));
-            }
-            4 => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-            5 => (0..order.len().saturating_sub(2))
-                .map(|i| [order[i], order[i + 1 + i % 2], order[i + 2 - i % 2]])
-                .collect(),
-            _ => (1..order.len().saturating_sub(1)).map(|i| [order[i], order[i + 1], order[0]]).collect(),
-        };
-        let material = match item.get("material")? {
-            Some(material) => material.index(self.default_material, "materials")?,
-            None => self.default_material,
-        };
-        Ok(Some(Primitive { item, positions, normals, corners, material }))
-    }
-
-    /// The triangles, their sets and the count of dropped ones. Materials that no triangle uses are removed.
+    /// All that was placed. Materials that no triangle uses are removed.
     ///
     /// # Errors
     /// If matter of different indices of refraction is in one set.
@@ -270,7 +292,7 @@ impl<'r, 'a> Meshes<'r, 'a> {
         file: &Path,
         materials: &mut Vec<Material>,
         warnings: &mut Vec<String>,
-    ) -> Result<(Vec<Triangle>, Vec<Set>, u64)> {
+    ) -> Result<Finished> {
         let mut used = vec![false; materials.len()];
         for triangle in &self.triangles {
             used[triangle.material as usize] = true;
@@ -302,8 +324,41 @@ impl<'r, 'a> Meshes<'r, 'a> {
                 self.below
             ));
         }
-        Ok((self.triangles, sets, self.dropped))
+        let coordinates = match materials.iter().any(Material::is_textured) {
+            true => self.triangles.iter().filter_map(|triangle| self.final_coordinates(triangle)).collect(),
+            false => Vec::new(),
+        };
+        let Meshes { triangles, dropped, .. } = self;
+        Ok(Finished { triangles, coordinates, sets, dropped })
     }
+}
+
+/// All triangles of a scene.
+pub(super) struct Finished {
+    pub triangles: Vec<Triangle>,
+    /// One for each triangle, or none without textures.
+    pub coordinates: Vec<Coordinates>,
+    pub sets: Vec<Set>,
+    /// Triangles of zero area.
+    pub dropped: u64,
+}
+
+fn normal_map(material: &Material) -> Option<Texture> {
+    material.textures[TEXTURE_NORMAL as usize]
+}
+
+/// The direction of growing u of a normal map on a triangle, and the sign with which normal x tangent points up the
+/// picture, against growing v: x and y of a map's normals are right and up. None where the map is folded to a line.
+fn tangent(map: &Texture, at: &Coordinates, [edge1, edge2]: [DVec3; 2], normal: DVec3) -> Option<(DVec3, f32)> {
+    let uv = |i: usize| {
+        let uv = at.uv[3 * map.set as usize + i].as_dvec2().extend(1.0);
+        glam::DVec2::new(map.rows[0].dot(uv), map.rows[1].dot(uv))
+    };
+    let (d1, d2) = (uv(1) - uv(0), uv(2) - uv(0));
+    let determinant = d1.perp_dot(d2);
+    let along = unit((edge1 * d2.y - edge2 * d1.y) * determinant.signum()).filter(|_| determinant != 0.0)?;
+    let up = (edge1 * d2.x - edge2 * d1.x) * determinant.signum();
+    Some((along, if normal.cross(along).dot(up) < 0.0 { -1.0 } else { 1.0 }))
 }
 
 /// Keeps the used items of a list; the new index of each.
@@ -340,7 +395,7 @@ fn unit(vector: DVec3) -> Option<DVec3> {
 }
 
 /// The matrix of cofactors, det(M) times the inverse transpose: it carries normals, even where M is singular.
-fn cofactors(matrix: &DMat3) -> DMat3 {
+pub(super) fn cofactors(matrix: &DMat3) -> DMat3 {
     let DMat3 { x_axis, y_axis, z_axis } = *matrix;
     DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis))
 }

@@ -11,8 +11,13 @@ mod json;
 mod material;
 mod medium;
 mod mesh;
+mod picture;
 mod presets;
+mod primitive;
+mod scattering;
 mod sets;
+mod skin;
+mod texture;
 mod unit;
 
 pub use presets::{Preset, preset, presets};
@@ -38,6 +43,8 @@ pub struct Scene {
     /// Compressed wide BVH over `triangles`, five words a node.
     pub nodes: Vec<glam::UVec4>,
     pub materials: Vec<Material>,
+    /// Pictures of the materials' textures.
+    pub pictures: Vec<Picture>,
     /// Surfaces that exchange light; `Triangle::set` is an index into it.
     pub sets: Vec<Set>,
     pub lights: Vec<Light>,
@@ -59,6 +66,20 @@ pub struct LoadOptions {
     pub unit: f64,
     /// (name of a material, name of a preset that replaces its medium and index of refraction); the last one counts.
     pub materials: Vec<(String, String)>,
+    /// What the multi-scatter colour of the scattering extensions means.
+    pub albedo_mapping: AlbedoMapping,
+}
+
+/// What the multi-scatter colour rho of KHR_materials_scatter and KHR_materials_volume_scatter means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AlbedoMapping {
+    /// As the drafts have it: the diffuse albedo of matter without a boundary that reflects. With one it is seen darker:
+    /// at an index of 1.5, .5 as .29.
+    #[default]
+    Gltf,
+    /// The colour that is seen: the total of the standard dipole with its boundary is rho, so that in uniform white light
+    /// of radiance 1 a plane shows Ft rho, and F of the surface on top, as a diffuse material of that base colour does.
+    Surface,
 }
 
 /// How warnings about the environment begin; a new environment takes them back.
@@ -66,7 +87,7 @@ const ENVIRONMENT_WARNING: &str = "environment: ";
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        LoadOptions { unit: 1.0, materials: Vec::new() }
+        LoadOptions { unit: 1.0, materials: Vec::new(), albedo_mapping: AlbedoMapping::Gltf }
     }
 }
 
@@ -99,11 +120,12 @@ impl Scene {
         if !(1e-9..=1e9).contains(&options.unit) {
             return Err(Error::setting("unit", format!("must be from 1e-9 to 1e9 metres, is {}", options.unit)));
         }
-        let gltf::Raw { triangles, dropped, materials, sets, lights, cameras, mut warnings } =
+        let gltf::Raw { triangles, coordinates, dropped, materials, pictures, sets, lights, cameras, mut warnings } =
             gltf::read(file, bytes, options)?;
         let frame = frame::around(file, &triangles, &materials)?;
         frame::check_nodes(file, &frame, &lights, &cameras)?;
-        let (triangles, shadings, too_small) = frame::internal(file, &frame, &triangles)?;
+        let frame::Internal { triangles, shadings, coordinates, too_small } =
+            frame::internal(file, &frame, &triangles, &coordinates)?;
         if too_small > 0 {
             warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
         }
@@ -113,9 +135,13 @@ impl Scene {
             frame,
             triangles: order.iter().map(|&index| triangles[index as usize]).collect(),
             shadings: order.iter().map(|&index| shadings[index as usize]).collect(),
-            coordinates: vec![],
+            coordinates: match coordinates.is_empty() {
+                true => vec![],
+                false => order.iter().map(|&index| coordinates[index as usize]).collect(),
+            },
             nodes,
             materials,
+            pictures,
             sets,
             lights,
             cameras,
@@ -196,6 +222,63 @@ pub struct Material {
     pub medium: Option<Medium>,
     /// The set that its surfaces join, wherever they are.
     pub set: Option<String>,
+    /// Whether the base colour tints light where it crosses the surface of translucent matter: where an extension of glTF
+    /// names the medium. Measured matter and coefficients have their own colour.
+    pub tinted: bool,
+    /// Media for the shares 0, 1/RAMP, ... 1 of the multi-scatter colour, if a texture scales it; else none.
+    pub ramp: Vec<Medium>,
+    /// By kind, TEXTURE_*. The texture of alpha has the scale factor / cutoff.
+    pub textures: [Option<Texture>; shared::TEXTURE_KINDS as usize],
+    /// Alpha is below the cutoff everywhere: there is no surface.
+    pub hidden: bool,
+}
+
+impl Material {
+    /// Whether it has any texture.
+    pub fn is_textured(&self) -> bool {
+        self.textures.iter().any(Option::is_some)
+    }
+}
+
+/// A texture of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texture {
+    /// Index into [`Scene::pictures`].
+    pub picture: usize,
+    /// TEXCOORD_0 or TEXCOORD_1.
+    pub set: u32,
+    /// Across and down.
+    pub wrap: [Wrap; 2],
+    /// The nearest texel, not an interpolation.
+    pub nearest: bool,
+    /// Rows of the affine map from the mesh's coordinates to the picture's.
+    pub rows: [DVec3; 2],
+    /// Scale of a normal map's x and y.
+    pub scale: f64,
+}
+
+impl Default for Texture {
+    fn default() -> Self {
+        let rows = [DVec3::X, DVec3::Y];
+        Texture { picture: 0, set: 0, wrap: [Wrap::Repeat; 2], nearest: false, rows, scale: 1.0 }
+    }
+}
+
+/// How a texture goes on beyond its edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrap {
+    Repeat,
+    Clamp,
+    Mirror,
+}
+
+/// A decoded picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    pub width: u32,
+    pub height: u32,
+    /// From the upper left, row by row: red in the lowest byte, alpha in the highest.
+    pub texels: Vec<u32>,
 }
 
 /// A scattering medium, per channel.
