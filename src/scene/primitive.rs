@@ -177,7 +177,7 @@ fn read_joints(arrays: &Arrays, item: &Item, attributes: &Item, count: usize) ->
         }
     }
     for (index, vertex) in joints.iter_mut().enumerate() {
-        let sum: f64 = vertex.iter().map(|(_, share)| share).sum();
+        let sum = vertex.iter().map(|(_, share)| share).sum::<f64>() + 0.0;
         if !(sum > 0.0 && sum.is_finite() && vertex.iter().all(|(_, share)| *share >= 0.0)) {
             return Err(item.error(format!("vertex {index} of a skin has joint weights of sum {sum}")));
         }

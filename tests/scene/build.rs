@@ -171,3 +171,14 @@ pub fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
     let chunks = [chunk(b"JSON", json.to_string().as_bytes(), b' '), chunk(b"BIN\0", binary, 0)].concat();
     [b"glTF", &2u32.to_le_bytes()[..], &(chunks.len() as u32 + 12).to_le_bytes(), &chunks].concat()
 }
+
+/// Appends a buffer, a view and an accessor.
+pub fn push_bytes(json: &mut Value, bytes: &[u8], component: u32, count: usize, kind: &str) {
+    let push = |json: &mut Value, list: &str, item: Value| {
+        json[list].as_array_mut().expect("a list").push(item);
+        json[list].as_array().map_or(0, Vec::len) - 1
+    };
+    let buffer = push(json, "buffers", json!({"byteLength": bytes.len(), "uri": data_uri(bytes)}));
+    let view = push(json, "bufferViews", json!({"buffer": buffer, "byteLength": bytes.len()}));
+    push(json, "accessors", json!({"bufferView": view, "componentType": component, "count": count, "type": kind}));
+}

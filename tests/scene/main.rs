@@ -7,9 +7,11 @@ mod geometry;
 mod materials;
 mod mutations;
 mod nodes;
+mod poses;
 mod presets;
 mod rules;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
 mod scenes;
 mod sets;
+mod textures;

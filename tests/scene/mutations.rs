@@ -1,6 +1,8 @@
 //! Broken files: whatever is changed in a file, it is refused or becomes a sound scene; nothing panics or hangs.
 
 use crate::build::*;
+use crate::textures::{encoded, picture};
+use image::ImageFormat;
 use serde_json::{Value, json};
 use translucent::scene::{LoadOptions, Scene};
 
@@ -9,23 +11,30 @@ fn rich() -> Value {
     let mut json = patched(json!({
         "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_volume"],
         "extensionsRequired": ["KHR_materials_volume"],
-        "scenes": [{"nodes": [0, 3]}],
+        "scenes": [{"nodes": [0, 3, 4]}],
         "nodes": [
             {"name": "thing", "mesh": 0, "translation": [1, 2, 3], "rotation": [0, 0, 0, 1], "scale": [1, -1, 2],
                 "children": [1, 2]},
             {"mesh": 1, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]},
             {"camera": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"camera": 1, "extensions": {"KHR_lights_punctual": {"light": 1}}}
+            {"camera": 1, "extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"mesh": 2, "skin": 0}
         ],
         "meshes": [
             {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]},
-            {"primitives": [
-                {"attributes": {"POSITION": 2, "NORMAL": 0}, "indices": 1, "material": 1, "mode": 5},
-                {"attributes": {"POSITION": 0}, "indices": 1, "material": 2},
-                {"attributes": {"POSITION": 0}, "indices": 1, "material": 3, "mode": 6},
-                {"attributes": {"POSITION": 0}, "indices": 1, "material": 4}
-            ]}
+            {"weights": [0.5, 0], "primitives": [
+                {"targets": [{"POSITION": 0}, {"NORMAL": 0}], "attributes": {"POSITION": 2, "NORMAL": 0}, "indices": 1, "material": 1, "mode": 5},
+                {"attributes": {"POSITION": 0}, "indices": 1, "material": 2, "targets": [{}, {}]},
+                {"attributes": {"POSITION": 0, "TEXCOORD_0": 3, "TEXCOORD_1": 3}, "indices": 1, "material": 3, "mode": 6,
+                    "targets": [{"POSITION": 0}, {"NORMAL": 0}]},
+                {"attributes": {"POSITION": 0}, "indices": 1, "material": 4, "targets": [{}, {}]}
+            ]},
+            {"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 4, "WEIGHTS_0": 5}, "indices": 1, "material": 4}]}
         ],
+        "skins": [{"joints": [1, 2], "inverseBindMatrices": 6}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9987}],
+        "images": [{"uri": data_uri(&encoded(&picture(), ImageFormat::Png)), "mimeType": "image/png"}],
         "cameras": [
             {"name": "c", "type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1.5, "znear": 0.1}},
             {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 9}}
@@ -45,9 +54,12 @@ fn rich() -> Value {
                 "KHR_materials_ior": {"ior": 1.3},
                 "KHR_materials_transmission": {"transmissionFactor": 1},
                 "KHR_materials_scatter": {"scatterStrengthFactor": 1, "multiscatterColorFactor": [0.1, 0.2, 0.3],
-                    "scatterAnisotropy": 0.3}}},
+                    "scatterAnisotropy": 0.3, "multiscatterColorTexture": {"index": 0}}}},
             {"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0.2, 1], "metallicFactor": 0.1, "roughnessFactor": 0.2},
-                "emissiveFactor": [1, 0, 0], "alphaMode": "MASK",
+                "emissiveFactor": [1, 0, 0], "alphaMode": "MASK", "alphaCutoff": 0.3,
+                "normalTexture": {"index": 0, "scale": 0.5, "extensions": {"KHR_texture_transform":
+                    {"offset": [0.1, 0.2], "rotation": 1, "scale": [2, 2], "texCoord": 0}}},
+                "emissiveTexture": {"index": 0, "texCoord": 1},
                 "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3}}},
             {"extras": {"bssrdf": {"albedo": 0.9, "diffuse_mean_free_path": 3, "unit": "cm"}}}
         ]
@@ -56,6 +68,11 @@ fn rich() -> Value {
         "sparse": {"count": 1, "indices": {"bufferView": 1, "byteOffset": 0, "componentType": 5123},
             "values": {"bufferView": 0, "byteOffset": 0}}});
     json["accessors"].as_array_mut().expect("an array").push(sparse);
+    push_bytes(&mut json, bytemuck::cast_slice(&[0.0f32, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]), 5126, 4, "VEC2");
+    push_bytes(&mut json, &[0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0], 5121, 4, "VEC4");
+    push_bytes(&mut json, bytemuck::cast_slice(&[[0.75f32, 0.25, 0.0, 0.0]; 4]), 5126, 4, "VEC4");
+    let unit = glam::Mat4::IDENTITY.to_cols_array();
+    push_bytes(&mut json, bytemuck::cast_slice(&[unit, unit]), 5126, 2, "MAT4");
     json
 }
 
@@ -96,6 +113,16 @@ fn check(result: Result<Scene, translucent::Error>) {
     }
     assert!(scene.frame.centre.is_finite() && scene.frame.scale.is_finite() && scene.frame.scale > 0.0);
     crate::bvh::check(&scene);
+    let textured = scene.materials.iter().any(|material| material.is_textured());
+    assert_eq!(scene.coordinates.len(), if textured { scene.triangles.len() } else { 0 });
+    for (coordinates, shading) in scene.coordinates.iter().zip(&scene.shadings) {
+        assert_eq!(coordinates.material, shading.material);
+        assert!(coordinates.uv.iter().all(|uv| uv.is_finite()) && coordinates.tangent.iter().all(|t| t.is_finite()));
+    }
+    for texture in scene.materials.iter().flat_map(|material| &material.textures).flatten() {
+        let picture = &scene.pictures[texture.picture];
+        assert!(!picture.texels.is_empty() && picture.texels.len() == (picture.width * picture.height) as usize);
+    }
 }
 
 fn load_bytes(bytes: &[u8]) -> Result<Scene, translucent::Error> {

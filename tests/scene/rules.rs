@@ -71,14 +71,33 @@ fn versions_and_extensions() {
     assert!(variants[0].contains("the extension KHR_materials_variants is not modelled"), "{variants:?}");
     assert_refused(&requiring("ACME_portal"), "extensionsRequired[0]", "required extension ACME_portal is not supp");
     assert_refused(&requiring("EXT_mesh_gpu_instancing"), "extensionsRequired[0]", "is not supported");
-    for compression in ["KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
-        assert_refused(&requiring(compression), "extensionsRequired[0]", "exporting it without compression");
+}
+
+#[test]
+fn compressed_data_name_their_mesh_and_the_way_out() {
+    // Required, but nowhere used: nothing is missing.
+    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu", "EXT_texture_webp"] {
+        let json = patched(json!({"extensionsRequired": [name], "extensionsUsed": [name]}));
+        assert_eq!(load(&json).warnings, Vec::<String>::new(), "{name}");
     }
     let mut draco = tetrahedron();
     draco["meshes"][0]["primitives"][0]["extensions"] = json!({"KHR_draco_mesh_compression": {"bufferView": 0}});
-    assert_refused(&draco, "meshes[0] (tetrahedron).primitives[0]", "compressed with Draco");
-    let meshopt = with("/bufferViews/0/extensions", json!({"EXT_meshopt_compression": {}}));
-    assert_refused(&meshopt, "bufferViews[0]", "is compressed");
+    let primitive = "meshes[0] (tetrahedron).primitives[0]";
+    assert_refused(&draco, primitive, "compressed with Draco (KHR_draco_mesh_compression)");
+    assert_refused(&draco, primitive, "`gltf-transform cp IN.glb OUT.glb`");
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        let meshopt = with("/bufferViews/0/extensions", json!({name: {}}));
+        assert_refused(&meshopt, &format!("{primitive}.attributes.POSITION"), &format!("is compressed ({name})"));
+        assert_refused(&meshopt, &format!("{primitive}.attributes.POSITION"), "gltf-transform cp");
+        // The buffer of decoded data has no bytes.
+        let mut fallback = with("/bufferViews/1/extensions", json!({name: {}}));
+        fallback["buffers"]
+            .as_array_mut()
+            .expect("buffers")
+            .push(json!({"byteLength": 24, "extensions": {name: {"fallback": true}}}));
+        fallback["bufferViews"][1]["buffer"] = json!(1);
+        assert_refused(&fallback, &format!("{primitive}.indices"), &format!("is compressed ({name})"));
+    }
 }
 
 #[test]
