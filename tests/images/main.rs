@@ -12,6 +12,7 @@ mod repeatable;
 mod scenes;
 mod statistics;
 mod table;
+mod textures;
 mod twins;
 
 pub use harness::{channel, device, mean_and_error, render};
