@@ -24,16 +24,21 @@ vec2 weights(Triangle triangle, vec3 from_corner) {
     return vec2(dot(cross(from_corner, triangle.edge2), n), dot(cross(triangle.edge1, from_corner), n)) / dot(n, n);
 }
 
-// Profile over density of the hit at xo + delta, where the camera projection's exponentials are combined; m as it is
-// at that hit.
-vec3 camera_factor(Seen s, Material m, Probe probe, vec3 delta, vec3 n) {
+// 1 / density of the hit at xo + delta under the camera projection, but for e^{rate radius}, which goes into the profile.
+float camera_factor(Seen s, Material m, Probe probe, vec3 delta, vec3 n) {
     float q = camera_ratio(s, delta);
     vec3 d = probe.direction;
     float cos_hit = abs(dot(n, d));
-    vec3 value = m.strength * shape_shifted(m, dot(delta, delta), m.camera_rate * probe.radius);
     // A hit in its own plane's direction has no density.
     float jacobian = cos_hit > 0.0 && q > 0.0 ? abs(dot(s.normal, d)) / (cos_hit * q * q) : 0.0;
-    return value * (2.0 * PI * probe.radius / m.camera_rate * jacobian);
+    return 2.0 * PI * probe.radius / m.camera_rate * jacobian;
+}
+
+// The directional dipole's value of light from wi that enters at xo + delta with the normal ni.
+vec3 directed(Material m, Seen s, vec3 delta, vec3 ni, vec3 wi, float shift) {
+    vec3 value = directional_value(m, -delta, ni, wi, s.shading_normal, shift);
+    if ((m.flags & RECIPROCAL) == 0u) return value;
+    return 0.5 * (value + directional_value(m, delta, s.shading_normal, s.wo, ni, shift));
 }
 
 // Density per solid angle of the directions that are drawn: the cosine, or half of it and half of the image's.
@@ -81,17 +86,17 @@ void main() {
     uint kept = min(count, MAX_HITS);
     float cumulative[MAX_HITS];
     float total = 0.0;
+    float shift = PROJECTION == PROJECTION_CAMERA ? m.camera_rate * probe.radius : 0.0;
     for (uint j = 0; j < kept; j++) {
         vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
         uint triangle = hit_lists[index].triangle[j];
         vec3 n = geometric_normal(triangles[triangle]);
         Material local = textured_medium(m, triangle, weights(triangles[triangle], (s.position - triangles[triangle].corner) + delta));
-        vec3 f;
+        vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift);
         float p = 1.0;
         if (PROJECTION == PROJECTION_CAMERA) {
-            f = camera_factor(s, local, probe, delta, n);
+            f *= camera_factor(s, m, probe, delta, n);
         } else {
-            f = local.strength * shape(local, dot(delta, delta));
             p = mixture_density(s, m, delta, n);
         }
         total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
@@ -110,10 +115,11 @@ void main() {
     vec3 n = s.side * geometric_normal(triangle);
     vec2 barycentric = weights(triangle, (s.position - triangle.corner) + delta);
     Material local = textured_medium(m, lit, barycentric);
-    vec3 f = PROJECTION == PROJECTION_CAMERA ? camera_factor(s, local, probe, delta, n)
-        : local.strength * shape(local, dot(delta, delta));
-    // f / p x total / (sum(f) / p): the density cancels.
-    vec3 factor = f * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
+    float given = PROJECTION == PROJECTION_CAMERA ? camera_factor(s, m, probe, delta, n) : 1.0;
+    vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift) * given;
+    // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
+    bool own_value = has_model(m, MODEL_DIRECTIONAL);
+    vec3 factor = (own_value ? vec3(given) : f) * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
 
     vec3 shading_n = s.side * shading_normal(shadings[lit], lit, barycentric);
     vec3 position = s.position + delta;
@@ -173,6 +179,7 @@ void main() {
         if (open && hit_count == 0u) {
             light *= transmittance(m.ior, cos_shading);
             if (has_model(m, MODEL_TABLE)) light *= table_obliqueness(m, cos_shading, false);
+            if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }
     }

@@ -57,6 +57,24 @@ float log1p_(float x) {
     return log_(w) + lost / w;
 }
 
+// (1 - e^{-x}) / x, 1 at 0.
+float one_minus_exp_over(float x) {
+    if (abs(x) > 0.34) return (1.0 - exp_(-x)) / x;
+    // The polynomial of exp_, without what it adds to 1.
+    float r = -x;
+    float p = 1.9875691500e-4;
+    p = p * r + 1.3981999507e-3;
+    p = p * r + 8.3334519073e-3;
+    p = p * r + 4.1665795894e-2;
+    p = p * r + 1.6666665459e-1;
+    p = p * r + 5.0000001201e-1;
+    return 1.0 + r * p;
+}
+
+vec3 one_minus_exp_over(vec3 x) {
+    return vec3(one_minus_exp_over(x.x), one_minus_exp_over(x.y), one_minus_exp_over(x.z));
+}
+
 // Cosine and sine of 2 pi u, for u in [0, 1].
 vec2 cos_sin_2pi(float u) {
     float quadrant = floor(u * 4.0 + 0.5);

@@ -51,6 +51,8 @@ const uint TABLE_HEADER = 8u;
 const uint TABLE_HALVINGS = 9u;
 // Most curvatures of a table.
 const uint TABLE_NODES = 40u;
+// Radius below which normalised diffusion, which is infinite at 0, counts as there [internal units].
+const float BURLEY_RADIUS_MIN = 1e-15;
 // No environment.
 const uint ENVIRONMENT_NONE = 0u;
 // The same radiance from everywhere.
@@ -244,9 +246,11 @@ struct Material {
     vec3 fluence;
     // Directional dipole: 2 A d_e, the height of the virtual source over the modified tangent plane.
     vec3 height;
-    // Directional dipole: squared 1 / (3 sigma_t), with sigma_t not reduced [length^2].
-    vec3 free_path2;
-    // Directional dipole: constant before its braces, 1 / (4 pi^2) over what leaves; and its renormalisation.
+    // Directional dipole: 1 / (3 sigma_t), with sigma_t not reduced.
+    vec3 free_path;
+    // Directional dipole: kappa / (3 sigma_t), the least that keeps its real source from the exit.
+    vec3 floor;
+    // Directional dipole: what stands before its maximum, with the renormalisation.
     vec3 beam;
     // Directional dipole: C_phi.
     float c_phi;

@@ -1,6 +1,7 @@
 // Textures: their values at a point of a triangle, and what they make of normals and materials. The mathematics is in
 // src/reference/texture.rs.
 
+#include "model.glsl"
 TEXELS(readonly);
 TEXTURES(readonly);
 COORDINATES(readonly);
@@ -115,11 +116,14 @@ Material textured_medium(Material m, uint triangle, vec2 barycentric) {
         BETWEEN(sigma_tr);
         BETWEEN(z_real);
         BETWEEN(z_virtual);
-        BETWEEN(fluence);
-        BETWEEN(height);
-        BETWEEN(free_path2);
-        BETWEEN(beam);
         BETWEEN(strength);
+        if (has_model(m, MODEL_BETTER)) BETWEEN(fluence);
+        if (has_model(m, MODEL_DIRECTIONAL)) {
+            BETWEEN(height);
+            BETWEEN(free_path);
+            BETWEEN(floor);
+            BETWEEN(beam);
+        }
     }
     return m;
 }

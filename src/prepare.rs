@@ -96,6 +96,9 @@ pub fn resolution(scene: &Scene, settings: &Settings) -> Result<(u32, u32)> {
 /// moves by less than 1e-4 of the radius, or is as good as lost.
 const MEAN_FREE_PATH: (f64, f64) = (1.0 / (1 << 17) as f64, 1e9);
 
+/// Largest kappa of the directional dipole: from there on its real source is nowhere near its depth.
+const KAPPA_MAX: f64 = 100.0;
+
 /// Longest side of an image (pixels).
 pub const MAX_SIDE: u32 = 65_536;
 
@@ -111,6 +114,9 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     }
     if !(1..=65_536).contains(&settings.directions) {
         return Err(Error::setting("directions", format!("{} is not between 1 and 65536", settings.directions)));
+    }
+    if !(settings.directional.kappa >= 0.0 && settings.directional.kappa <= KAPPA_MAX) {
+        return Err(Error::setting("kappa", format!("{} is not in [0, {KAPPA_MAX}]", settings.directional.kappa)));
     }
     if !(settings.radius_tail >= 0.0 && settings.radius_tail < 0.1) {
         return Err(Error::setting("radius tail", format!("{} is not in [0, 0.1)", settings.radius_tail)));
@@ -365,7 +371,11 @@ fn material(
             let constant = profile::constant(model)
                 .ok_or_else(|| Error::setting("model", format!("the {model} model is not built yet")))?;
             let coefficients = [0, 1, 2].map(|c| coefficients(medium, material.ior, frame.scale, c));
-            let options = profile::Options { normalisation: settings.normalisation, radius_tail: settings.radius_tail };
+            let options = profile::Options {
+                normalisation: settings.normalisation,
+                radius_tail: settings.radius_tail,
+                directional: settings.directional,
+            };
             let mut out = if constant == shared::MODEL_TABLE {
                 profile::tabulated(&coefficients, options, &[], profiles)
             } else {

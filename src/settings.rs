@@ -75,6 +75,24 @@ impl FromStr for Model {
     }
 }
 
+/// What may be changed about the directional dipole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Directional {
+    /// Scales each channel so that a plane under diffuse light gives back what it gives with the standard dipole.
+    pub renormalise: bool,
+    /// Averages it with itself, light and eye exchanged: reciprocal, as the published model is not.
+    pub reciprocal: bool,
+    /// The real source is at least kappa / (3 sigma_t) from the exit also where the published model puts it there, and
+    /// meshes and normal maps show fireflies; 0 is the published model. At least 0; 1 makes the distance continuous.
+    pub kappa: f64,
+}
+
+impl Default for Directional {
+    fn default() -> Self {
+        Directional { renormalise: false, reciprocal: false, kappa: 1.0 }
+    }
+}
+
 /// Which camera of the scene looks.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub enum CameraChoice {
@@ -101,6 +119,7 @@ pub struct Settings {
     pub normalisation: Normalisation,
     /// Profile of every translucent material; `Auto` leaves it to each.
     pub model: Model,
+    pub directional: Directional,
     /// Key of all random numbers.
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
@@ -128,6 +147,7 @@ impl Default for Settings {
             projection: Projection::Mis,
             normalisation: Normalisation::Energy,
             model: Model::Auto,
+            directional: Directional::default(),
             seed: 0,
             show_environment: false,
             variance: true,

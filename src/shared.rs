@@ -218,6 +218,9 @@ constants! {
     /// Most curvatures of a table.
     TABLE_NODES: u32 = 40;
 
+    /// Radius below which normalised diffusion, which is infinite at 0, counts as there [internal units].
+    BURLEY_RADIUS_MIN: f32 = 1e-15;
+
     /// No environment.
     ENVIRONMENT_NONE: u32 = 0;
     /// The same radiance from everywhere.
@@ -400,9 +403,11 @@ structs! {
         fluence: Vec3,
         /// Directional dipole: 2 A d_e, the height of the virtual source over the modified tangent plane.
         height: Vec3,
-        /// Directional dipole: squared 1 / (3 sigma_t), with sigma_t not reduced [length^2].
-        free_path2: Vec3,
-        /// Directional dipole: constant before its braces, 1 / (4 pi^2) over what leaves; and its renormalisation.
+        /// Directional dipole: 1 / (3 sigma_t), with sigma_t not reduced.
+        free_path: Vec3,
+        /// Directional dipole: kappa / (3 sigma_t), the least that keeps its real source from the exit.
+        floor: Vec3,
+        /// Directional dipole: what stands before its maximum, with the renormalisation.
         beam: Vec3,
         /// Directional dipole: C_phi.
         c_phi: f32,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
+    settings::Directional,
 };
 
 #[derive(clap::Args)]
@@ -33,6 +34,15 @@ pub struct SceneOptions {
     /// How light spreads in every translucent material; auto is what the material says, else the standard dipole.
     #[arg(long, default_value = "auto", value_parser = models())]
     model: Model,
+    /// Scale the directional dipole so that it gives back no more light than the standard one.
+    #[arg(long)]
+    renormalise: bool,
+    /// Average the directional dipole with itself, light and eye exchanged.
+    #[arg(long)]
+    reciprocal: bool,
+    /// Regularisation of the directional dipole near its source; 0 is the published model, with its fireflies.
+    #[arg(long, value_name = "K", default_value_t = 1.0, allow_negative_numbers = true, value_parser = arguments::not_negative)]
+    kappa: f64,
     /// Light from infinitely far away: a latitude-longitude image or one radiance.
     #[arg(long, value_name = "FILE.hdr|.exr|constant:R,G,B", value_parser = arguments::environment)]
     environment: Option<EnvironmentSource>,
@@ -135,6 +145,7 @@ impl SceneOptions {
             projection: self.projection,
             normalisation: self.normalisation,
             model: self.model,
+            directional: Directional { renormalise: self.renormalise, reciprocal: self.reciprocal, kappa: self.kappa },
             show_environment: self.show_environment,
             ..Settings::default()
         }

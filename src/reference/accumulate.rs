@@ -22,15 +22,15 @@ use super::boundary::transmittance;
 use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::pixel::position;
-use super::profile::{self, Matter, shapes, shapes_shifted};
+use super::profile::{self, Directional, Matter, shapes, shapes_shifted};
 use super::projection::{Seen, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal};
 use super::random::{batch, key, scramble, sobol, unit};
 use super::sample::coordinate;
 use super::sums::Contribution;
 use super::{Inputs, emitter, intersect, texture};
 use crate::shared::{
-    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, PROJECTION_CAMERA,
-    Probe, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
+    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, MODEL_DIRECTIONAL,
+    PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -93,19 +93,39 @@ pub fn accumulate(
     let Some((chosen, factor)) = choose(inputs, step, index, matter, &seen, probe, hits) else {
         return Contribution::default();
     };
+    let delta = delta(probe, hits, chosen);
     let ior = f64::from(matter.material.ior);
-    let point = surface.position.as_dvec3() + delta(probe, hits, chosen);
+    let point = surface.position.as_dvec3() + delta;
     let entry = Entry::new(inputs, ior, seen.side, point, hits.triangle[chosen]);
     let leaving = entry.tint
         * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
         * transmittance(ior, seen.shading_normal.dot(seen.wo))
         * profile::obliqueness(matter, seen.shading_normal.dot(seen.wo), true);
-    Contribution::of(leaving * factor * entering_light(inputs, step, index, matter, &entry))
+    let given = inputs.features.projection == PROJECTION_CAMERA;
+    let exponent = if given { f64::from(matter.material.camera_rate) * f64::from(probe.radius) } else { 0.0 };
+    let local = texture::medium(inputs, matter.material, hits.triangle[chosen], entry.weights);
+    let value = |wi: DVec3| match matter.material.model {
+        MODEL_DIRECTIONAL => directed(Matter { material: &local, ..matter }, &seen, delta, entry.shading, wi, exponent),
+        _ => profile::obliqueness(matter, entry.shading.dot(wi), false),
+    };
+    Contribution::of(leaving * factor * entering_light(inputs, step, index, &entry, value))
 }
 
 /// The base colour's texture, which tints what crosses the surface; the factor is in the profile's strength.
 fn tint(inputs: &Inputs, triangle: u32, barycentric: DVec2) -> DVec3 {
     texture::value(inputs, TEXTURE_BASE_COLOR, triangle, barycentric).truncate()
+}
+
+/// The directional dipole's value of light from `wi` that enters at xo + `delta` with the normal `ni`.
+fn directed(matter: Matter, seen: &Seen, delta: DVec3, ni: DVec3, wi: DVec3, exponent: f64) -> DVec3 {
+    DVec3::from([0, 1, 2].map(|c| {
+        let profile = Directional::unpack(matter, c);
+        let value = profile.value(-delta, ni, wi, seen.shading_normal, exponent);
+        if matter.material.flags & RECIPROCAL == 0 {
+            return value;
+        }
+        (value + profile.value(delta, seen.shading_normal, seen.wo, ni, exponent)) / 2.0
+    }))
 }
 
 /// From xo to hit `j`.
@@ -143,7 +163,9 @@ pub fn choose(
             let local = local(j);
             let local = Matter { material: &local, ..matter };
             let f = local.material.strength.as_dvec3() * shapes(local, delta.length());
-            if p > 0.0 { (f / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
+            // The directional dipole's own value comes with each ray.
+            let value = if matter.material.model == MODEL_DIRECTIONAL { DVec3::ONE } else { f };
+            if p > 0.0 { (value / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
         })
         .collect();
     let total: f64 = terms.iter().map(|(_, w)| w).sum();
@@ -164,8 +186,11 @@ fn given_factor(matter: Matter, seen: &Seen, probe: &Probe, delta: DVec3, normal
     let (r, rate) = (f64::from(probe.radius), f64::from(matter.material.camera_rate));
     let d = probe.direction.as_dvec3();
     let jacobian = seen.normal.dot(d).abs() / normal.dot(d).abs() * inverse_scale(seen, delta).powi(2);
-    let profile = shapes_shifted(matter, delta.length(), rate * r);
-    matter.material.strength.as_dvec3() * profile * (TAU * r / rate * jacobian)
+    let value = match matter.material.model {
+        MODEL_DIRECTIONAL => DVec3::ONE,
+        _ => matter.material.strength.as_dvec3() * shapes_shifted(matter, delta.length(), rate * r),
+    };
+    value * (TAU * r / rate * jacobian)
 }
 
 /// A point where light enters.
@@ -178,6 +203,8 @@ struct Entry {
     ior: f64,
     /// Base colour where the light crosses the surface.
     tint: DVec3,
+    /// Weights of the second and third vertex.
+    weights: DVec2,
 }
 
 impl Entry {
@@ -185,7 +212,8 @@ impl Entry {
         let shape = &inputs.triangles[triangle as usize];
         let weights = barycentric(shape, point);
         let shading = side * shading_normal(inputs, triangle, weights);
-        Entry { point, normal: side * geometric_normal(shape), shading, ior, tint: tint(inputs, triangle, weights) }
+        let tint = tint(inputs, triangle, weights);
+        Entry { point, normal: side * geometric_normal(shape), shading, ior, tint, weights }
     }
 
     /// Ft(wi) cos; 0 below either horizon.
@@ -196,7 +224,9 @@ impl Entry {
 }
 
 /// E: the light of the step's rays that enters.
-fn entering_light(inputs: &Inputs, step: &Step, index: u32, matter: Matter, entry: &Entry) -> DVec3 {
+///
+/// `value` is what a direction's light weighs besides.
+fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let origin = lifted(entry.point, entry.normal);
     let first_direction = inputs.features.first_direction(inputs.view);
     let directions = f64::from(inputs.view.directions);
@@ -204,10 +234,7 @@ fn entering_light(inputs: &Inputs, step: &Step, index: u32, matter: Matter, entr
         // Most rays need not be traced.
         let entering = |wi: DVec3, light: &dyn Fn() -> DVec3| {
             let transmission = entry.transmission(wi);
-            if transmission <= 0.0 {
-                return DVec3::ZERO;
-            }
-            profile::obliqueness(matter, entry.shading.dot(wi), false) * transmission * light()
+            if transmission > 0.0 { transmission * value(wi) * light() } else { DVec3::ZERO }
         };
         if let Some(light) = inputs.lights.get(k as usize) {
             let incident = light::delta(light, entry.point);

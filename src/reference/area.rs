@@ -2,10 +2,10 @@
 //!
 //! Lo(xo, wo) = int_A int_Omega S Li cos dw dA with points x_i uniform over the area of all triangles of the set: no
 //! tangent plane, no projection, no density but 1 / A; triangles' own normals everywhere; pseudo-random numbers. Slow
-//! where the profile is narrow, unbiased always. Formulas are written down once more here, from
-//! H. W. Jensen et al., SIGGRAPH 2001, and with the moments of Fresnel's equations by quadrature.
+//! where the profile is narrow, unbiased always. The models' formulas are written down once more here, from their papers,
+//! and with the moments of Fresnel's equations by quadrature.
 
-use crate::settings::Normalisation;
+use crate::settings::{Model, Normalisation};
 use crate::shared::Triangle;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,9 +29,13 @@ pub fn corners(triangles: &[Triangle], set: u32) -> (Vec<Corners>, Vec<Corners>)
 pub struct Matter {
     pub sigma_s_prime: DVec3,
     pub sigma_a: DVec3,
+    /// Mean cosine of the phase function.
+    pub g: f64,
     /// Inside over outside.
     pub ior: f64,
     pub normalisation: Normalisation,
+    /// Any but `Auto` and `Table`.
+    pub model: Model,
 }
 
 /// A light without extent.
@@ -75,8 +79,8 @@ pub fn leaving(setting: &Setting, point: DVec3, normal: DVec3, wo: DVec3, sample
     let exit = 1.0 - reflectance(setting.matter.ior, normal.dot(wo));
     let moments = moments(samples, seed, |rng| {
         let (x, n) = surface.sample(rng);
-        let profile = surface.profile((x - point).length());
-        exit * profile * surface.area * surface.entering(x, n, rng)
+        let profile = |wi: DVec3| surface.profile(point - x, n, wi, normal);
+        exit * surface.area * surface.entering(x, n, rng, profile)
     });
     moments.estimate()
 }
@@ -86,7 +90,7 @@ pub fn entering_flux(setting: &Setting, samples: u64, seed: u64) -> Estimate {
     let surface = Surface::new(setting);
     let sample = |rng: &mut Random| {
         let (x, n) = surface.sample(rng);
-        surface.area * surface.entering(x, n, rng)
+        surface.area * surface.entering(x, n, rng, |_| DVec3::ONE)
     };
     moments(samples, seed, sample).estimate()
 }
@@ -157,14 +161,21 @@ fn diffuse_reflectance(n: f64) -> f64 {
     (0..steps).map(|i| reflectance(n, ((f64::from(i) + 0.5) / f64::from(steps)).sqrt())).sum::<f64>() / f64::from(steps)
 }
 
+/// int F c^2 dc over the cosines of one side, by the midpoint rule in c^3.
+fn second_moment(n: f64) -> f64 {
+    let steps = 200_000;
+    let sum: f64 = (0..steps).map(|i| reflectance(n, ((f64::from(i) + 0.5) / f64::from(steps)).cbrt())).sum();
+    sum / f64::from(3 * steps)
+}
+
 /// The set, prepared: areas for sampling, profiles, a tree for shadows.
 struct Surface<'a> {
     setting: &'a Setting<'a>,
     /// Running sums of the areas of the triangles.
     areas: Vec<f64>,
     area: f64,
-    /// Per channel: albedo, sigma_tr, depth of the real and height of the virtual source.
-    profiles: [[f64; 4]; 3],
+    /// Internal and external moments of the reflectance: int F c dc, int F c^2 dc inside; 2 int F c dc outside.
+    moments: [f64; 3],
     /// 1 / (pi (1 - rho_e)), or 1 / pi.
     scale: f64,
     shadows: Node,
@@ -178,34 +189,119 @@ impl<'a> Surface<'a> {
             area
         };
         let areas: Vec<f64> = setting.set.iter().map(&mut add).collect();
-        let Matter { sigma_s_prime, sigma_a, ior, normalisation } = setting.matter;
+        let Matter { ior, normalisation, .. } = setting.matter;
         let outside = diffuse_reflectance(ior);
         // Light that crosses is the same from both sides: n^2 (1 - rho_i) = 1 - rho_e.
         let inside = 1.0 - (1.0 - outside) / (ior * ior);
-        let profiles = [0, 1, 2].map(|c| {
-            let extinction = sigma_s_prime[c] + sigma_a[c];
-            let diffusion = 1.0 / (3.0 * extinction);
-            let depth = 1.0 / extinction;
-            let height = depth + 4.0 * (1.0 + inside) / (1.0 - inside) * diffusion;
-            [sigma_s_prime[c] / extinction, (sigma_a[c] / diffusion).sqrt(), depth, height]
-        });
+        let moments = [inside / 2.0, second_moment(1.0 / ior), outside];
         let scale = match normalisation {
             Normalisation::Energy => 1.0 / (PI * (1.0 - outside)),
             Normalisation::Jensen2001 => 1.0 / PI,
         };
         let all = setting.set.iter().chain(setting.blockers).copied().collect();
-        Surface { setting, areas, area, profiles, scale, shadows: Node::build(all) }
+        Surface { setting, areas, area, moments, scale, shadows: Node::build(all) }
     }
 
-    /// Rd(r) times the constant of S.
-    fn profile(&self, r: f64) -> DVec3 {
-        DVec3::from(self.profiles.map(|[albedo, sigma, depth, height]| {
-            let source = |z: f64| {
-                let d = (r * r + z * z).sqrt();
-                z * (1.0 + sigma * d) * (-sigma * d).exp() / d.powi(3)
-            };
-            if albedo > 0.0 { self.scale * albedo / (4.0 * PI) * (source(depth) + source(height)) } else { 0.0 }
+    /// S without the Fresnel factors, of light from `wi` that enters with the normal `ni` and leaves at the distance `x`
+    /// from there with the normal `no`.
+    fn profile(&self, x: DVec3, ni: DVec3, wi: DVec3, no: DVec3) -> DVec3 {
+        DVec3::from([0, 1, 2].map(|c| {
+            if self.setting.matter.sigma_s_prime[c] == 0.0 {
+                return 0.0;
+            }
+            match self.setting.matter.model {
+                Model::Better => self.scale * self.better(c, x.length()),
+                Model::Burley => self.scale * self.burley(c, x.length()),
+                Model::Directional => self.scale * self.directional(c, x, ni, wi, no),
+                _ => self.scale * self.standard(c, x.length()),
+            }
         }))
+    }
+
+    /// Albedo, extinction and absorption of a channel, reduced.
+    fn coefficients(&self, c: usize) -> (f64, f64, f64) {
+        let Matter { sigma_s_prime, sigma_a, .. } = self.setting.matter;
+        let extinction = sigma_s_prime[c] + sigma_a[c];
+        (sigma_s_prime[c] / extinction, extinction, sigma_a[c])
+    }
+
+    /// Jensen et al. 2001.
+    fn standard(&self, c: usize, r: f64) -> f64 {
+        let (albedo, extinction, absorption) = self.coefficients(c);
+        let diffusion = 1.0 / (3.0 * extinction);
+        let sigma = (absorption / diffusion).sqrt();
+        let depth = 1.0 / extinction;
+        let inside = 2.0 * self.moments[0];
+        let height = depth + 4.0 * (1.0 + inside) / (1.0 - inside) * diffusion;
+        let source = |z: f64| {
+            let d = (r * r + z * z).sqrt();
+            z * (1.0 + sigma * d) * (-sigma * d).exp() / d.powi(3)
+        };
+        albedo / (4.0 * PI) * (source(depth) + source(height))
+    }
+
+    /// C_phi, C_E and A of d'Eon 2012.
+    fn boundary(&self) -> (f64, f64, f64) {
+        let (c1, c2) = (self.moments[0], self.moments[1]);
+        ((1.0 - 2.0 * c1) / 4.0, (1.0 - 3.0 * c2) / 2.0, (1.0 + 3.0 * c2) / (1.0 - 2.0 * c1))
+    }
+
+    /// d'Eon 2012, with a signed height as there.
+    fn better(&self, c: usize, r: f64) -> f64 {
+        let (albedo, extinction, absorption) = self.coefficients(c);
+        let (c_phi, c_e, a) = self.boundary();
+        let diffusion = (extinction + absorption) / (3.0 * extinction * extinction);
+        let sigma = (absorption / diffusion).sqrt();
+        let depth = 1.0 / extinction;
+        let term = |z: f64| {
+            let d = (r * r + z * z).sqrt();
+            (c_e * z * (1.0 + sigma * d) / (d * d) + c_phi / diffusion) * (-sigma * d).exp() / d
+        };
+        albedo * albedo / (4.0 * PI) * (term(depth) - term(-(depth + 4.0 * a * diffusion)))
+    }
+
+    /// Christensen and Burley 2015 with the standard dipole's total (Jensen and Buhler 2002) and the diffuse mean free
+    /// path.
+    fn burley(&self, c: usize, r: f64) -> f64 {
+        let (albedo, extinction, absorption) = self.coefficients(c);
+        let inside = 2.0 * self.moments[0];
+        let e = (3.0 * (1.0 - albedo)).sqrt();
+        let total = albedo / 2.0 * (1.0 + (-4.0 / 3.0 * (1.0 + inside) / (1.0 - inside) * e).exp()) * (-e).exp();
+        let length = 1.0 / (3.0 * absorption * extinction).sqrt();
+        let s = 3.5 + 100.0 * (total - 0.33).powi(4);
+        let x = s * r / length;
+        total * s / (8.0 * PI * length * r) * ((-x).exp() + (-x / 3.0).exp())
+    }
+
+    /// Frisvad et al. 2014, times pi (1 - rho_e) like a radial profile; the real source kept at 1 / (3 sigma_t).
+    fn directional(&self, c: usize, x: DVec3, ni: DVec3, wi: DVec3, no: DVec3) -> f64 {
+        let (albedo, extinction, absorption) = self.coefficients(c);
+        let (c_phi, c_e, a) = self.boundary();
+        let diffusion = 1.0 / (3.0 * extinction);
+        let sigma = (absorption / diffusion).sqrt();
+        let extrapolated = 2.131 * diffusion / albedo.sqrt();
+        let n = self.setting.matter.ior;
+        let cos = wi.dot(ni);
+        let w = (cos * ni - wi) / n - ni * (1.0 - (1.0 - cos * cos) / (n * n)).sqrt();
+        let r = x.length();
+        let term = |x: DVec3, w: DVec3, d: f64| {
+            let sd = sigma * d;
+            let first = c_phi * (d * d / diffusion + 3.0 * (1.0 + sd) * x.dot(w));
+            let inner = 1.0 + sd + 3.0 * diffusion * (3.0 * (1.0 + sd) + sd * sd) / (d * d) * x.dot(w);
+            let second = c_e * (3.0 * diffusion * (1.0 + sd) * w.dot(no) - inner * x.dot(no));
+            (-sd).exp() / d.powi(3) * (first - second)
+        };
+        let unreduced = self.setting.matter.sigma_s_prime[c] / (1.0 - self.setting.matter.g) + absorption;
+        let least = 1.0 / (3.0 * unreduced).powi(2);
+        let mu = -no.dot(w);
+        let beta = -((r * r - x.dot(w).powi(2)).max(0.0) / (r * r + extrapolated * extrapolated)).sqrt();
+        let front = diffusion * mu * (diffusion * mu - 2.0 * extrapolated * beta);
+        let near = (r * r + if mu > 0.0 { front.max(least) } else { least }).sqrt();
+        // BAC - CAB written out, as the paper has it.
+        let across = x.normalize().cross(ni.cross(x).normalize());
+        let place = x - 2.0 * a * extrapolated * across;
+        let mirrored = w - 2.0 * w.dot(across) * across;
+        (term(x, w, near) - term(place, mirrored, place.length())).max(0.0) / (4.0 * PI)
     }
 
     /// A point uniform over the area, and the normal there.
@@ -220,15 +316,16 @@ impl<'a> Surface<'a> {
         (a + (b - a) * s + (c - a) * t, (b - a).cross(c - a).normalize())
     }
 
-    /// Irradiance at `x` that passes the surface; the surrounding by one cosine-weighted direction.
-    fn entering(&self, x: DVec3, normal: DVec3, rng: &mut Random) -> DVec3 {
-        let lit = |wi: DVec3, distance: f64| -> f64 {
+    /// Irradiance at `x` that passes the surface, each direction times `weight`; the surrounding by one cosine-weighted
+    /// direction.
+    fn entering(&self, x: DVec3, normal: DVec3, rng: &mut Random, weight: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let lit = |wi: DVec3, distance: f64| -> DVec3 {
             let cos = normal.dot(wi);
             let start = x + normal * SHADOW_OFFSET;
             if cos <= 0.0 || self.shadows.blocks(start, wi, distance) {
-                0.0
+                DVec3::ZERO
             } else {
-                (1.0 - reflectance(self.setting.matter.ior, cos)) * cos
+                (1.0 - reflectance(self.setting.matter.ior, cos)) * cos * weight(wi)
             }
         };
         let mut sum = DVec3::ZERO;
@@ -249,7 +346,7 @@ impl<'a> Surface<'a> {
             let wi = (normal + DVec3::new(r * phi.cos(), r * phi.sin(), z)).normalize_or(normal);
             let cos = normal.dot(wi);
             if cos > 0.0 {
-                sum += self.setting.surrounding * (PI / cos * lit(wi, f64::INFINITY));
+                sum += self.setting.surrounding * PI / cos * lit(wi, f64::INFINITY);
             }
         }
         sum

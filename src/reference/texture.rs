@@ -158,14 +158,15 @@ pub fn medium(inputs: &Inputs, material: &Material, triangle: u32, barycentric: 
 }
 
 /// What a medium determines of each channel of a material.
-pub fn medium_fields() -> [fn(&mut Material) -> &mut Vec3; 8] {
+pub fn medium_fields() -> [fn(&mut Material) -> &mut Vec3; 9] {
     [
         |m| &mut m.sigma_tr,
         |m| &mut m.z_real,
         |m| &mut m.z_virtual,
         |m| &mut m.fluence,
         |m| &mut m.height,
-        |m| &mut m.free_path2,
+        |m| &mut m.free_path,
+        |m| &mut m.floor,
         |m| &mut m.beam,
         |m| &mut m.strength,
     ]

@@ -178,6 +178,9 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
         "model": settings.model.to_string(),
+        "renormalise": settings.directional.renormalise,
+        "reciprocal": settings.directional.reciprocal,
+        "kappa": settings.directional.kappa,
         "radiusTail": settings.radius_tail,
         "showEnvironment": settings.show_environment,
     });

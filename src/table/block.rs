@@ -67,9 +67,7 @@ impl Block {
     pub fn new(channels: &[Option<Channel>; 3], spheres: &[i32]) -> Block {
         let present = || channels.iter().flatten();
         let finest = present().map(|c| 1.0 / (c.scattering / c.albedo)).fold(f64::INFINITY, f64::min);
-        let farthest = present()
-            .map(|c| c.table.tail(c.albedo, BEYOND) / c.scattering)
-            .fold(0.0, f64::max);
+        let farthest = present().map(|c| c.table.tail(c.albedo, BEYOND) / c.scattering).fold(0.0, f64::max);
         let smallest = spheres.first().map_or(f64::INFINITY, |&i| sphere(i));
         let low = if finest.is_finite() { finest.min(smallest) / 4096.0 } else { 1.0 };
         let first = grid::cell((low * low) as f32);

@@ -67,7 +67,9 @@ pub fn walks(g: f64) -> u64 {
 pub fn table(ior: f64, g: f64) -> Arc<White> {
     static MADE: LazyLock<Mutex<HashMap<(u64, u64), Arc<White>>>> = LazyLock::new(Mutex::default);
     let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
-    if near(g, 0.0) && let Some(index) = SHIPPED_IORS.iter().position(|&shipped| near(shipped, ior)) {
+    if near(g, 0.0)
+        && let Some(index) = SHIPPED_IORS.iter().position(|&shipped| near(shipped, ior))
+    {
         return shipped(index);
     }
     // Digits that no measurement has would only fill the cache.

@@ -80,10 +80,8 @@ impl Walk {
     /// Walks, and what leaves at each of the absorptions sigma_a / sigma_s'. The result does not depend on the number of
     /// threads.
     pub fn run(&self, absorptions: &[f64]) -> Vec<Leaving> {
-        let weights: Vec<Vec<f64>> = absorptions
-            .iter()
-            .map(|a| (0..LENGTHS).map(|i| (-a * length(i)).exp()).collect())
-            .collect();
+        let weights: Vec<Vec<f64>> =
+            absorptions.iter().map(|a| (0..LENGTHS).map(|i| (-a * length(i)).exp()).collect()).collect();
         // Part by part: for each absorption the cells, then the total.
         let parts: Vec<Vec<Vec<f64>>> = (0..PARTS)
             .into_par_iter()
@@ -257,7 +255,13 @@ impl<'a> Tracer<'a> {
     fn expect_isotropic(&mut self, q: DVec3, path: f64, mut light: f64) {
         let (rho, a) = (q.length(), self.set.radius);
         let depth = if self.plane() { q.z } else { a - rho };
-        let rare = if depth > 8.0 { 64.0 } else if depth > 3.0 { 8.0 } else { 1.0 };
+        let rare = if depth > 8.0 {
+            64.0
+        } else if depth > 3.0 {
+            8.0
+        } else {
+            1.0
+        };
         if rare > 1.0 {
             if self.random() * rare > 1.0 {
                 return;

@@ -235,7 +235,9 @@ fn smoothed(leaving: &Leaving, radius: f64, dipole: &Dipole) -> Curve {
     let mut logarithm = vec![NOTHING; CELLS];
     let good: Vec<usize> = (0..reached).filter(|&cell| error[cell] > 0.0 && error[cell] <= NOISY).collect();
     let longest = good.chunk_by(|a, b| a + 1 == *b).max_by_key(|run| run.len()).map(|run| (run[0], run[run.len() - 1]));
-    let Some((first, last)) = longest else { return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error } };
+    let Some((first, last)) = longest else {
+        return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error };
+    };
     for cell in first..=last {
         let window = cell.saturating_sub(3).max(first)..=(cell + 3).min(last);
         let [c0, c1, c2] = parabola(window.map(|i| {
@@ -319,7 +321,10 @@ impl Profile {
 
     /// The part that Monte Carlo gives.
     pub fn multiple(&self, r: f64) -> f64 {
-        self.parts.iter().map(|part| part.weight * part.stretch.powi(2) * part.value(r * part.stretch, &self.dipole)).sum()
+        self.parts
+            .iter()
+            .map(|part| part.weight * part.stretch.powi(2) * part.value(r * part.stretch, &self.dipole))
+            .sum()
     }
 
     /// Standard error of a cell's light at the distance r, relative to [`Profile::multiple`], before smoothing.
@@ -379,7 +384,8 @@ impl Part {
             // On spheres the last cell continues the line from the cell before.
             if self.end.is_finite() {
                 let slope = if last > 0 { self.logarithm[last] - self.logarithm[last - 1] } else { 0.0 };
-                let step = if last > 0 { (s / middle(last)).ln() / (middle(last) / middle(last - 1)).ln() } else { 0.0 };
+                let step =
+                    if last > 0 { (s / middle(last)).ln() / (middle(last) / middle(last - 1)).ln() } else { 0.0 };
                 return (self.logarithm[last] + slope * step).exp();
             }
             return self.logarithm[last].exp() * dipole.shape(r) / dipole.shape(middle(last).sqrt()).max(1e-300);

@@ -132,7 +132,13 @@ pub fn matter(sigma_tr: f64, albedo: f64, ior: f64, normalisation: Normalisation
 
 /// The standard dipole of matter in three channels.
 pub fn standard(sigma_s: DVec3, sigma_a: DVec3, ior: f64, normalisation: Normalisation, radius_tail: f64) -> Material {
-    modelled(MODEL_STANDARD, sigma_s, sigma_a, ior, Options { normalisation, radius_tail })
+    modelled(
+        MODEL_STANDARD,
+        sigma_s,
+        sigma_a,
+        ior,
+        Options { normalisation, radius_tail, directional: Default::default() },
+    )
 }
 
 /// Matter in three channels under a model, one of MODEL_*.

@@ -11,7 +11,7 @@ use crate::{
 use glam::DVec3;
 use serde_json::{Value, json};
 use translucent::{
-    Normalisation, Projection, Settings,
+    Model, Normalisation, Projection, Settings,
     reference::area::{Corners, Lamp, Matter, Setting, leaving},
     scene::Environment,
 };
@@ -30,6 +30,13 @@ struct Experiment {
     meshes: Vec<Mesh>,
     lamps: Vec<Lamp>,
     surrounding: f64,
+    model: Model,
+}
+
+impl Default for Experiment {
+    fn default() -> Self {
+        Experiment { meshes: vec![], lamps: vec![], surrounding: 0.0, model: Model::Standard }
+    }
 }
 
 impl Experiment {
@@ -62,8 +69,10 @@ impl Experiment {
             matter: Matter {
                 sigma_s_prime: SIGMA_S_PRIME.into(),
                 sigma_a: SIGMA_A.into(),
+                g: 0.0,
                 ior: IOR,
                 normalisation: Normalisation::Energy,
+                model: self.model,
             },
             lamps: &self.lamps,
             surrounding: DVec3::splat(self.surrounding),
@@ -74,7 +83,8 @@ impl Experiment {
             if projection == Projection::Normal && self.meshes.iter().any(|mesh| mesh.indices.len() < 200) {
                 continue;
             }
-            let settings = Settings { resolution: Some((8, 8)), seed: 17, projection, ..Settings::default() };
+            let settings =
+                Settings { resolution: Some((8, 8)), seed: 17, projection, model: self.model, ..Settings::default() };
             let image = render(&scene, &settings, 256);
             for (c, letter) in ["R", "G", "B"].into_iter().enumerate() {
                 let values = channel(&image, &format!("subsurface.{letter}"));
@@ -106,7 +116,7 @@ fn sphere() {
     let experiment = Experiment {
         meshes: vec![Mesh::sphere(1.0, 24)],
         lamps: vec![sun(DVec3::new(-1.0, -0.5, -0.8))],
-        surrounding: 0.0,
+        ..Experiment::default()
     };
     let mesh = &experiment.meshes[0];
     // Middles of triangles: lit from the front, at the terminator, and on the dark side seen at a shallow angle.
@@ -124,8 +134,8 @@ fn sphere() {
 fn cube() {
     let mut cube = Mesh::default();
     cube.cuboid(DVec3::splat(-1.0), DVec3::splat(1.0), 1);
-    let uniform = Experiment { meshes: vec![cube.clone()], lamps: vec![], surrounding: 1.0 };
-    let lit = Experiment { meshes: vec![cube], lamps: vec![lamp(DVec3::new(3.0, 1.0, 2.0))], surrounding: 0.0 };
+    let uniform = Experiment { meshes: vec![cube.clone()], surrounding: 1.0, ..Experiment::default() };
+    let lit = Experiment { meshes: vec![cube], lamps: vec![lamp(DVec3::new(3.0, 1.0, 2.0))], ..Experiment::default() };
     let eye = DVec3::new(1.5, -2.0, 4.0);
     for (name, point) in [
         ("middle", DVec3::new(0.1, 0.2, 1.0)),
@@ -142,7 +152,8 @@ fn cube() {
 fn thin_slab_lit_from_behind() {
     let mut slab = Mesh::default();
     slab.cuboid(DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.15), 1);
-    let experiment = Experiment { meshes: vec![slab], lamps: vec![lamp(DVec3::new(0.3, 0.2, -2.0))], surrounding: 0.0 };
+    let experiment =
+        Experiment { meshes: vec![slab], lamps: vec![lamp(DVec3::new(0.3, 0.2, -2.0))], ..Experiment::default() };
     experiment.compare("slab, middle", DVec3::new(0.1, -0.2, 0.15), DVec3::Z, DVec3::new(0.5, 1.0, 4.0));
     experiment.compare("slab, rim", DVec3::new(0.95, 0.3, 0.15), DVec3::Z, DVec3::new(0.5, 1.0, 4.0));
     experiment.compare("slab, side", DVec3::new(1.0, 0.1, 0.07), DVec3::X, DVec3::new(4.0, 1.0, 1.0));
@@ -165,8 +176,12 @@ fn concave() -> Mesh {
 
 #[test]
 fn concave_shape_shadows_itself() {
-    let experiment =
-        Experiment { meshes: vec![concave()], lamps: vec![sun(DVec3::new(0.6, -1.0, -0.3))], surrounding: 0.3 };
+    let experiment = Experiment {
+        meshes: vec![concave()],
+        lamps: vec![sun(DVec3::new(0.6, -1.0, -0.3))],
+        surrounding: 0.3,
+        ..Experiment::default()
+    };
     let eye = DVec3::new(4.0, 5.0, 3.0);
     experiment.compare("L, inner corner", DVec3::new(1.05, 1.0, 0.5), DVec3::Y, eye);
     experiment.compare("L, inner wall", DVec3::new(1.0, 1.3, 0.4), DVec3::X, eye);
@@ -186,8 +201,34 @@ fn touching_objects_exchange_no_light() {
         cuboid(DVec3::new(0.0, -1.0, -1.0), DVec3::new(1.0, 1.0, 1.0)),
         cuboid(DVec3::new(-0.3, -0.3, 1.0), DVec3::new(0.3, 0.3, 1.5)),
     ];
-    let experiment = Experiment { meshes, lamps: vec![lamp(DVec3::new(2.0, 1.0, 3.0))], surrounding: 0.5 };
+    let experiment =
+        Experiment { meshes, lamps: vec![lamp(DVec3::new(2.0, 1.0, 3.0))], surrounding: 0.5, ..Experiment::default() };
     let eye = DVec3::new(-3.0, -1.0, 5.0);
     experiment.compare("near the wall", DVec3::new(-0.02, 0.7, 1.0), DVec3::Z, eye);
     experiment.compare("in the shadow", DVec3::new(-0.33, -0.2, 1.0), DVec3::Z, eye);
+}
+
+#[test]
+fn every_model_on_a_sphere_and_a_cube() {
+    let mut cube = Mesh::default();
+    cube.cuboid(DVec3::splat(-1.0), DVec3::splat(1.0), 1);
+    for model in [Model::Better, Model::Burley, Model::Directional] {
+        let sphere = Experiment {
+            meshes: vec![Mesh::sphere(1.0, 24)],
+            lamps: vec![sun(DVec3::new(-1.0, -0.5, -0.8))],
+            model,
+            ..Experiment::default()
+        };
+        let [a, b, c] = corners(&sphere.meshes[0])[40];
+        let (point, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
+        sphere.compare(&format!("{model} on a sphere"), point, normal, point + 4.0 * normal + DVec3::X);
+        let cube = Experiment {
+            meshes: vec![cube.clone()],
+            lamps: vec![lamp(DVec3::new(3.0, 1.0, 2.0))],
+            surrounding: 0.4,
+            model,
+        };
+        let eye = DVec3::new(1.5, -2.0, 4.0);
+        cube.compare(&format!("{model} near an edge"), DVec3::new(0.98, 0.2, 1.0), DVec3::Z, eye);
+    }
 }

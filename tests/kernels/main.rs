@@ -6,6 +6,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod math;
+mod models;
 mod overflow;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]

@@ -33,7 +33,8 @@ void main() {
 }
 "#;
 
-fn compile() -> Vec<u8> {
+/// SPIR-V of a kernel that only a test has.
+pub fn compile(source: &str) -> Vec<u8> {
     let compiler = shaderc::Compiler::new().expect("shaderc starts");
     let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
@@ -46,7 +47,7 @@ fn compile() -> Vec<u8> {
         Ok(shaderc::ResolvedInclude { resolved_name: name.into(), content })
     });
     let compiled =
-        compiler.compile_into_spirv(KERNEL.trim_start(), shaderc::ShaderKind::Compute, "math", "main", Some(&options));
+        compiler.compile_into_spirv(source.trim_start(), shaderc::ShaderKind::Compute, "test", "main", Some(&options));
     compiled.expect("the kernel compiles").as_binary_u8().to_vec()
 }
 
@@ -71,7 +72,7 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         thickness: &[],
     };
     let mut bench = bench();
-    bench.add("math", &compile(), &inputs.features);
+    bench.add("math", &compile(KERNEL), &inputs.features);
     let loaded = bench.load(&inputs, &[], &[(Slot::BatchSums, bytemuck::cast_slice(x))]);
     let step = Step { pixel_count: x.len() as u32, ray_begin: function, ..Step::default() };
     bench.dispatch("math", &loaded, &step);

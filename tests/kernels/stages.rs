@@ -5,11 +5,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 use translucent::{
-    Projection, Scene, Settings,
+    Model, Projection, Scene, Settings,
     reference::{
         self, Inputs, accumulate::accumulate, primary::primary, reflect::reflect, reproject::reproject, sample::sample,
     },
     scene::{Environment, EnvironmentMap, LightKind},
+    settings::Directional,
     shared::{BATCHES, Hits, MISS, Pixel, Probe, Slot, Step, Sums, Surface},
 };
 
@@ -71,6 +72,31 @@ fn cases() -> Vec<(String, Case)> {
             };
             cases.push((format!("{projection:?}, {name}"), Case::new(scene, &settings)));
         }
+    }
+    // The other models, each under one light.
+    let others = [
+        (Model::Better, Projection::Mis, None),
+        (Model::Burley, Projection::Camera, Some(&constant)),
+        (Model::Directional, Projection::Mis, None),
+        (Model::Directional, Projection::Camera, Some(&constant)),
+    ];
+    for (model, projection, environment) in others {
+        let mut scene = demo.clone();
+        if let Some(environment) = environment {
+            scene.set_environment(environment.clone()).expect("the environment is valid");
+            scene.lights.truncate(1);
+        }
+        let directional = Directional { reciprocal: projection == Projection::Mis, ..Directional::default() };
+        let settings = Settings {
+            resolution: Some(FULL),
+            crop: Some(CROP),
+            projection,
+            seed: 4,
+            model,
+            directional,
+            ..Settings::default()
+        };
+        cases.push((format!("{model}, {projection:?}"), Case::new(scene, &settings)));
     }
     cases
 }

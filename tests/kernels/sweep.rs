@@ -75,7 +75,11 @@ fn random_material(random: &mut Random, model: Model, projection: Projection) ->
         let (sigma_s_prime, sigma_a) = (extinction * (1.0 - absorbed), extinction * absorbed);
         Coefficients { sigma_s_prime, sigma_a, g, ior, appearance: None }
     });
-    let options = Options { normalisation: Normalisation::Energy, radius_tail: random.pick(&[1e-6, 0.0]) };
+    let options = Options {
+        normalisation: Normalisation::Energy,
+        radius_tail: random.pick(&[1e-6, 0.0]),
+        directional: Default::default(),
+    };
     let mut material = modelled_as(model, &channels, options);
     material.radius_max = material.radius_max.min(SET_DIAMETER);
     material.alpha = random.pick(&[0.0, 0.0, 1e-6, 1e-3, 0.1, 1.0]);

@@ -2,6 +2,7 @@
 
 use crate::common::*;
 use glam::{DVec3, Vec3, dvec3};
+use translucent::Model;
 use translucent::Normalisation::{self, Energy};
 use translucent::reference::area::{self, Corners, Lamp, Matter, Setting};
 use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
@@ -10,7 +11,14 @@ use translucent::shared::*;
 
 fn medium(sigma_tr: f64, albedo: f64, ior: f64, normalisation: Normalisation) -> Matter {
     let (sigma_s, sigma_a) = coefficients(sigma_tr, albedo);
-    Matter { sigma_s_prime: DVec3::splat(sigma_s), sigma_a: DVec3::splat(sigma_a), ior, normalisation }
+    Matter {
+        sigma_s_prime: DVec3::splat(sigma_s),
+        sigma_a: DVec3::splat(sigma_a),
+        g: 0.0,
+        ior,
+        normalisation,
+        model: Model::Standard,
+    }
 }
 
 fn setting<'a>(set: &'a [Corners], matter: Matter, lamps: &'a [Lamp], surrounding: f64) -> Setting<'a> {
@@ -142,7 +150,8 @@ fn compare(set: &[Corners], blockers: &[Corners], (triangle, weights): (usize, [
     let wo = wo.normalize();
     assert!(normal.dot(wo) > 0.0);
 
-    let matter = Matter { sigma_s_prime: sigma_s, sigma_a, ior: 1.4, normalisation: Energy };
+    let matter =
+        Matter { sigma_s_prime: sigma_s, sigma_a, g: 0.0, ior: 1.4, normalisation: Energy, model: Model::Standard };
     let lamps = [
         Lamp::Directional { direction: sun_to.normalize(), irradiance: DVec3::splat(2.0) },
         Lamp::Point { position: dvec3(1.0, 3.0, 2.0), intensity: DVec3::splat(5.0) },

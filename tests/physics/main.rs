@@ -6,6 +6,7 @@ mod common;
 mod density;
 mod edge;
 mod light;
+mod models;
 mod plane;
 mod profile;
 mod random;

@@ -92,6 +92,11 @@ fn inversion_of_the_total() {
             let again = Dipole::new(1.0 - e * e / 3.0, e * e / 3.0, ior).total();
             assert!((again - total).abs() < 1e-9 * total, "Rd {total} n {ior}: {again}");
         }
+        for total in [1e-12, 1e-9, 1e-6, 1.0 - 1e-6, 1.0 - 1e-9, 1.0 - 1e-12, 1.0 - 1e-15] {
+            let e = invert_total(total, ior);
+            let again = Dipole::new(1.0 - e * e / 3.0, e * e / 3.0, ior).total();
+            assert!((again - total).abs() < 1e-15, "Rd {total} n {ior}: {again}");
+        }
         assert_eq!(invert_total(1.0, ior), 0.0);
         assert!((invert_total(0.0, ior) - 3f64.sqrt()).abs() < 1e-15);
     }

@@ -15,20 +15,28 @@
 //! per area of the plane is the shapes of the channels, each over its integral, averaged: the weight of a point on a
 //! plane does not depend on r.
 
+pub mod better;
+pub mod burley;
+pub mod directional;
 mod source;
 pub mod standard;
 pub mod table;
 
+pub use better::BetterDipole;
+pub use burley::{Burley, Fit};
+pub use directional::Directional;
 pub use source::Source;
 pub use standard::{Dipole, boundary_factor, invert_total};
 pub use table::Tabulated;
 
 use super::boundary::{Side, diffuse_reflectance};
 use crate::scene::{LengthKind, Medium};
-use crate::settings::{Model, Normalisation};
-use crate::shared::{self, MODEL_STANDARD, MODEL_TABLE, Material, TRANSLUCENT};
+use crate::settings::{self, Model, Normalisation};
+use crate::shared::{
+    self, MODEL_BETTER, MODEL_BURLEY, MODEL_DIRECTIONAL, MODEL_STANDARD, MODEL_TABLE, Material, RECIPROCAL, TRANSLUCENT,
+};
 use crate::table::block::Block;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::f64::consts::PI;
 use std::ops::Deref;
 
@@ -103,7 +111,7 @@ pub trait Radial {
     fn rate(&self) -> f64;
 
     /// Writes what kernels read of channel `c`, but for strength, density and component_cdf.
-    fn pack(&self, c: usize, material: &mut Material);
+    fn pack(&self, c: usize, options: &Options, material: &mut Material);
 
     /// Rd over strength [1/length^2].
     fn shape(&self, r: f64) -> f64 {
@@ -200,6 +208,9 @@ macro_rules! models {
 }
 models! {
     Standard, MODEL_STANDARD: Dipole;
+    Better, MODEL_BETTER: BetterDipole;
+    Directional, MODEL_DIRECTIONAL: Directional;
+    Burley, MODEL_BURLEY: Burley;
     Table, MODEL_TABLE: Tabulated;
 }
 
@@ -264,6 +275,17 @@ pub struct Options {
     pub normalisation: Normalisation,
     /// Share of the energy beyond `radius_max`; 0 has no ball.
     pub radius_tail: f64,
+    pub directional: settings::Directional,
+}
+
+impl Options {
+    /// Exitance over the radiance that leaves without its factor Ft(wo): pi (1 - rho_e), or pi.
+    pub fn leaving(&self, ior: f64) -> f64 {
+        match self.normalisation {
+            Normalisation::Energy => PI * (1.0 - diffuse_reflectance(ior, Side::Outside)),
+            Normalisation::Jensen2001 => PI,
+        }
+    }
 }
 
 /// The BSSRDF part of a material as kernels read it; the rest is zero, for the caller to fill. `model` is one of MODEL_*.
@@ -275,15 +297,12 @@ pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> sha
     let channels = matter.each_ref().map(|matter| Profile::new(model, matter));
     let scattering = || channels.iter().filter(|c| c.strength() > 0.0);
     let probability = 1.0 / scattering().count().max(1) as f64;
-    let leaving = match options.normalisation {
-        Normalisation::Energy => PI * (1.0 - diffuse_reflectance(ior, Side::Outside)),
-        Normalisation::Jensen2001 => PI,
-    };
+    let leaving = options.leaving(ior);
 
     let mut material = Material { model, ior: ior as f32, flags: TRANSLUCENT, ..Material::default() };
     let mut cumulative = 0.0;
     for (c, channel) in channels.iter().enumerate() {
-        channel.pack(c, &mut material);
+        channel.pack(c, &options, &mut material);
         if channel.strength() == 0.0 {
             continue;
         }
@@ -303,7 +322,9 @@ pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> sha
     let radius_max = scattering().map(|c| c.radius_beyond(options.radius_tail)).fold(0.0, f64::max);
     material.radius_max = (radius_max as f32).min(UNBOUNDED);
     material.camera_rate = scattering().map(|c| c.rate()).reduce(f64::min).unwrap_or(0.0) as f32;
-    material.base_color = Vec3::ZERO;
+    if model == MODEL_DIRECTIONAL && options.directional.reciprocal {
+        material.flags |= RECIPROCAL;
+    }
     material
 }
 

@@ -22,7 +22,7 @@
 //! where the total is close to 1: there 1 - alpha' is the square of 1 - total.
 
 use super::super::boundary::{Side, diffuse_reflectance};
-use super::{COMPONENTS, Coefficients, Matter, Radial, Source};
+use super::{COMPONENTS, Coefficients, Matter, Options, Radial, Source};
 use crate::shared::Material;
 
 /// The standard dipole of one channel.
@@ -120,7 +120,7 @@ impl Radial for Dipole {
         self.sigma_tr
     }
 
-    fn pack(&self, c: usize, material: &mut Material) {
+    fn pack(&self, c: usize, _options: &Options, material: &mut Material) {
         material.sigma_tr[c] = self.sigma_tr as f32;
         material.z_real[c] = self.z_real as f32;
         material.z_virtual[c] = self.z_virtual as f32;
@@ -129,7 +129,8 @@ impl Radial for Dipole {
 
 /// e = sqrt(3 (1 - alpha')) of the matter with the given total (0 to 1) and index of refraction.
 ///
-/// sigma_t' = sigma_tr / e, alpha' = 1 - e^2 / 3. 1 at least gives 0, 0 at most gives sqrt(3).
+/// sigma_t' = sigma_tr / e, alpha' = 1 - e^2 / 3. 1 at least gives 0, 0 at most gives sqrt(3). The total of the result is within
+/// 1e-15 of the one asked for, which is nine digits of it from 1e-6 up and of 1 - total up to 1 - 1e-6.
 pub fn invert_total(total: f64, ior: f64) -> f64 {
     let a = boundary_factor(ior);
     let of = |e: f64| (1.0 - e * e / 3.0) / 2.0 * (1.0 + (-4.0 / 3.0 * a * e).exp()) * (-e).exp();

@@ -13,9 +13,13 @@
 //! T(1) (1 + k (1 - mu')), with k from the total under diffuse light: that factor stands at the entry and, since light
 //! paths can be reversed, at the exit, divided there by its mean.
 
-use super::{COMPONENTS, Coefficients, Matter, Radial};
+use super::{COMPONENTS, Coefficients, Matter, Options, Radial};
 use crate::shared::Material;
-use crate::table::{self, block::{Block, HEADER}, grid};
+use crate::table::{
+    self,
+    block::{Block, HEADER},
+    grid,
+};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -126,7 +130,8 @@ fn nodes(matter: Matter) -> Vec<(usize, f64, f64)> {
     let curvature = matter.curvature;
     let count = matter.material.table_nodes as usize;
     let of = |k: usize| Node::of(matter, k).curvature();
-    let stretch = |k: usize, other: f64| if other > 0.0 && of(k) > 0.0 && curvature > 0.0 { curvature / of(k) } else { 1.0 };
+    let stretch =
+        |k: usize, other: f64| if other > 0.0 && of(k) > 0.0 && curvature > 0.0 { curvature / of(k) } else { 1.0 };
     // Curvatures fall from node to node.
     let above = (0..count).take_while(|&k| of(k) > curvature).count();
     if above == count {
@@ -247,7 +252,7 @@ impl Radial for Tabulated {
         self.rate
     }
 
-    fn pack(&self, c: usize, material: &mut Material) {
+    fn pack(&self, c: usize, _options: &Options, material: &mut Material) {
         material.sigma_tr[c] = self.rate as f32;
     }
 }
