@@ -77,7 +77,9 @@ impl Experiment {
             lamps: &self.lamps,
             surrounding: DVec3::splat(self.surrounding),
         };
-        let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 18, 11);
+        // Points uniform on the area rarely come near the pole of normalised diffusion.
+        let samples = if self.model == Model::Burley { 1 << 20 } else { 1 << 18 };
+        let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), samples, 11);
         for projection in [Projection::Mis, Projection::Normal] {
             // The normal axis never finds a face that it runs along.
             if projection == Projection::Normal && self.meshes.iter().any(|mesh| mesh.indices.len() < 200) {
