@@ -6,10 +6,15 @@ use translucent::reference::math::integrate;
 use translucent::reference::profile::{
     Coefficients, Matter, Options, Profile, draw_radius, plane_density, shapes, tabulated,
 };
+use translucent::settings::Directional;
 use translucent::settings::Normalisation;
 use translucent::shared::MODEL_TABLE;
 
-const OPTIONS: Options = Options { normalisation: Normalisation::Energy, radius_tail: 1e-4 };
+const OPTIONS: Options = Options {
+    normalisation: Normalisation::Energy,
+    radius_tail: 1e-4,
+    directional: Directional { renormalise: false, reciprocal: false, kappa: 1.0 },
+};
 
 fn matter(sigma_s_prime: f64, sigma_a: f64, ior: f64) -> Coefficients {
     Coefficients { sigma_s_prime, sigma_a, g: 0.0, ior, appearance: None }
