@@ -3,7 +3,7 @@
 
 use crate::{
     error::Result,
-    model,
+    model::{self, Advice, Choice},
     reference::profile::{self, Coefficients, Profile},
     render::{Limits, Plan, value_name},
     scene::{EnvironmentMap, Lens, LightKind, Material, Medium, Scene},
@@ -44,6 +44,10 @@ pub struct MatterReport {
     /// The model of the profile, and why it.
     pub model: Model,
     pub why: String,
+    /// What would be recommended.
+    pub recommended: Choice,
+    /// Error of the model on a plane, in the channel where it is largest.
+    pub error: Option<model::errors::Error>,
     /// [1/mm].
     pub sigma_s_prime: DVec3,
     /// [1/mm].
@@ -60,10 +64,10 @@ pub struct MatterReport {
 }
 
 impl MatterReport {
-    fn new(medium: &Medium, ior: f64, settings: &Settings) -> MatterReport {
+    fn new(medium: &Medium, ior: f64, advice: &Advice) -> MatterReport {
         let (sigma_s_prime, sigma_a) = (medium.sigma_s_prime * 1e-3, medium.sigma_a * 1e-3);
         let extinction = sigma_s_prime + sigma_a;
-        let choice = model::resolve(settings, medium);
+        let choice = advice.choice.clone();
         let total = |c: usize| {
             let constant = profile::constant(choice.model)?;
             Some(Profile::new(constant, &Coefficients::of(medium, ior, c)).total())
@@ -72,6 +76,8 @@ impl MatterReport {
             source: medium.source.clone(),
             model: choice.model,
             why: choice.why,
+            recommended: advice.recommended.clone(),
+            error: advice.error,
             sigma_s_prime,
             sigma_a,
             g: medium.g,
@@ -96,10 +102,15 @@ impl<'a> Inspection<'a> {
             name: material.name.clone(),
             triangles: scene.shadings.iter().filter(|shading| shading.material as usize == index).count(),
             ior: material.ior,
-            matter: material.medium.as_ref().map(|medium| MatterReport::new(medium, material.ior, settings)),
+            matter: material
+                .medium
+                .as_ref()
+                .zip(plan.prepared.advice[index].as_ref())
+                .map(|(medium, advice)| MatterReport::new(medium, material.ior, advice)),
         };
         let materials = scene.materials.iter().enumerate().map(report).collect();
-        Ok(Inspection { scene, plan, materials, warnings: scene.warnings.clone() })
+        let warnings = scene.warnings.iter().cloned().chain(plan.prepared.warnings()).collect();
+        Ok(Inspection { scene, plan, materials, warnings })
     }
 
     /// Everything, for machines. Lengths are in mm where a name says so, else in metres.
@@ -172,6 +183,8 @@ fn material(report: &MaterialReport) -> Value {
             "source": matter.source,
             "model": matter.model.to_string(),
             "why": matter.why,
+            "recommended": {"model": matter.recommended.model.to_string(), "why": matter.recommended.why},
+            "error": matter.error.map(|error| json!({"total": error.total, "l1": error.l1})),
             "sigmaSPrimePerMm": matter.sigma_s_prime.to_array(),
             "sigmaAPerMm": matter.sigma_a.to_array(),
             "g": matter.g.to_array(),

@@ -2,7 +2,7 @@
 
 use crate::{
     error::{Error, Result},
-    model,
+    model::{self, Advice},
     reference::{
         Inputs, emitter, light,
         profile::{self, Coefficients, Dipole, Radial},
@@ -32,6 +32,8 @@ pub struct Prepared {
     pub profiles: Vec<f32>,
     /// Curvatures at the vertices of each triangle, none where no profile depends on them.
     pub thickness: Vec<Vec3>,
+    /// The model of each material and why it; none for opaque ones.
+    pub advice: Vec<Option<Advice>>,
     /// The camera that looks, for what is said about the image.
     pub camera: Camera,
     /// Rows that are rendered: from the first, exclusive of the last.
@@ -47,6 +49,11 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// What a user should know of the models that were chosen.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        self.advice.iter().flatten().filter_map(|advice| advice.warning.clone())
+    }
+
     /// The buffers as the twins read them.
     pub fn inputs<'a>(&'a self, scene: &'a Scene) -> Inputs<'a> {
         Inputs {
@@ -122,12 +129,14 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         return Err(Error::setting("radius tail", format!("{} is not in [0, 0.1)", settings.radius_tail)));
     }
 
-    let mut profiles = vec![];
-    let materials = materials(scene, settings, &mut profiles)?;
     let frame = scene.frame;
+    let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
+    let footprint = footprint(&camera, frame, height);
+    let advice: Vec<_> = scene.materials.iter().map(|m| model::advise(settings, m, footprint)).collect();
+    let mut profiles = vec![];
+    let materials = materials(scene, settings, &advice, &mut profiles)?;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
-    let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
 
     let mut view = view_of(&camera, frame, width, height);
     view.crop_x = x0;
@@ -199,9 +208,19 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         textures,
         profiles,
         thickness: vec![],
+        advice,
         camera,
         rows: y0..y1,
     })
+}
+
+/// Width of a pixel where the translucent part comes nearest to the eye (m); 0 if it may touch it.
+fn footprint(camera: &Camera, frame: Frame, height: u32) -> f64 {
+    let distance = (frame.centre - camera.eye).length() - 1.0 / frame.scale;
+    match camera.lens {
+        Lens::Perspective { yfov, .. } => 2.0 * (0.5 * yfov).tan() * distance.max(0.0) / f64::from(height),
+        Lens::Orthographic { ymag, .. } => 2.0 * ymag / f64::from(height),
+    }
 }
 
 /// The camera's part of a View, in internal units.
@@ -270,9 +289,19 @@ fn coefficients(medium: &Medium, ior: f64, scale: f64, c: usize) -> Coefficients
 pub const SET_DIAMETER: f32 = 2.000_01;
 
 /// Materials in the scene's order, then the ramps of those that have one.
-fn materials(scene: &Scene, settings: &Settings, profiles: &mut Vec<f32>) -> Result<Vec<Material>> {
-    let each = |m: &scene::Material| material(m, scene.frame, settings, profiles);
-    let mut out = scene.materials.iter().map(each).collect::<Result<Vec<_>>>()?;
+fn materials(
+    scene: &Scene,
+    settings: &Settings,
+    advice: &[Option<Advice>],
+    profiles: &mut Vec<f32>,
+) -> Result<Vec<Material>> {
+    let chosen = |advice: &Option<Advice>| {
+        let model = advice.as_ref().map_or(settings.model, |advice| advice.choice.model);
+        Settings { model, ..settings.clone() }
+    };
+    let each =
+        |(m, advice): (&scene::Material, &Option<Advice>)| material(m, scene.frame, &chosen(advice), profiles);
+    let mut out = scene.materials.iter().zip(advice).map(each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
         out[index].ramp = out.len() as u32;
         let whole = out[index];
@@ -283,7 +312,7 @@ fn materials(scene: &Scene, settings: &Settings, profiles: &mut Vec<f32>) -> Res
         let first = out.len();
         for medium in &authored.ramp {
             let node = scene::Material { medium: Some(medium.clone()), ..authored.clone() };
-            out.push(material(&node, scene.frame, settings, profiles)?);
+            out.push(material(&node, scene.frame, &chosen(&advice[index]), profiles)?);
         }
         // Black matter has no lengths of its own.
         let mut next = out[first + 1];

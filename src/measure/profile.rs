@@ -104,14 +104,15 @@ fn radii(setup: &Setup, matter: &Matter) -> Result<Vec<f64>> {
     let surfaces = per_pixel(Slot::Surfaces, pixels * BATCHES);
     let probes = per_pixel(Slot::Probes, pixels);
     let mut buffers = vec![];
-    let data: [(Slot, &[u8]); 5] = [
+    let data: [(Slot, &[u8]); 6] = [
         (Slot::Views, bytemuck::bytes_of(&prepared.view)),
         (Slot::Nodes, bytemuck::cast_slice(&scene.nodes)),
         (Slot::Triangles, bytemuck::cast_slice(&scene.triangles)),
         (Slot::Shadings, bytemuck::cast_slice(&scene.shadings)),
         (Slot::Materials, bytemuck::cast_slice(&prepared.materials)),
+        (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
     ];
-    for (slot, data) in data {
+    for (slot, data) in data.into_iter().filter(|(_, data)| !data.is_empty()) {
         let buffer = Buffer::new(device, slot.name(), data.len() as u64, Location::Device)?;
         upload(device, &buffer, data)?;
         buffers.push((slot, buffer));

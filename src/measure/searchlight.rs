@@ -17,7 +17,7 @@ use crate::{
         self, Estimate,
         searchlight::{Incidence, Searchlight},
     },
-    settings::Settings,
+    settings::{Model, Settings},
 };
 use glam::DVec3;
 use serde_json::json;
@@ -56,7 +56,7 @@ pub fn searchlight(setup: &Setup) -> Result<Figure> {
             points.push(Point { x: middle(ring), measured, error, expected });
         }
         let curve = fine.iter().map(|r| (*r, profile.rd(*r))).collect();
-        series.push(Series { name: matter.model.to_string(), points, curve });
+        series.push(Series { name: matter.model.to_string(), points, curve }.as_far_as_known(&matter));
         notes.push(format!("{}: the body ends where {:.1e} of the light lies beyond", matter.model, matter.lost()));
     }
 
@@ -75,7 +75,9 @@ pub fn searchlight(setup: &Setup) -> Result<Figure> {
         series.push(Series { name: "random walk".into(), points: points.collect(), curve: vec![] });
         let Estimate { mean, error } = beam.total;
         notes.push(format!("random walk: {paths} paths, total {mean:.4} +- {error:.4}; models against it:"));
-        notes.extend(setup.matters.iter().map(|matter| errors(matter, path, beam)));
+        // The profile of the directional dipole is where its samples come from, not what it sends out.
+        let radial = setup.matters.iter().filter(|matter| matter.model != Model::Directional);
+        notes.extend(radial.map(|matter| errors(matter, path, beam)));
     }
     let panel = Panel {
         name: "searchlight".into(),

@@ -35,7 +35,9 @@ impl Inspect {
             device => Limits::of(&Device::open(&DeviceOptions { device, ..DeviceOptions::default() })?),
         };
         let mut inspection = Inspection::new(&scene, &self.scene.settings(), limits)?;
-        inspection.warnings = warnings;
+        // The program's own come with the scene's.
+        let models = inspection.plan.prepared.warnings();
+        inspection.warnings = warnings.into_iter().chain(models).collect();
         let text = if self.json { format!("{:#}\n", inspection.json()) } else { text(&inspection) };
         print(&text)?;
         Ok(ExitCode::SUCCESS)
@@ -105,6 +107,12 @@ fn materials(inspection: &Inspection) -> String {
             Some(matter) => {
                 let _ = writeln!(text, ", {}", matter.source);
                 let _ = writeln!(text, "    model {}: {}", matter.model, matter.why);
+                if let Some(error) = matter.error {
+                    let _ = writeln!(text, "    a plane {error}");
+                }
+                if matter.recommended.model != matter.model {
+                    let _ = writeln!(text, "    recommended {}: {}", matter.recommended.model, matter.recommended.why);
+                }
                 text.push_str(&coefficients(matter));
             }
         }

@@ -67,6 +67,7 @@ impl Render {
         let options = DeviceOptions { device: self.device.clone(), ..DeviceOptions::default() };
         let device = Device::open(&options)?;
         let mut renderer = Renderer::new(&device, &scene, &self.settings())?;
+        renderer.prepared().warnings().for_each(|warning| self.warn(&warning));
 
         let bar = self.bar();
         let start = Instant::now();

@@ -130,6 +130,10 @@ fn absent(slot: Slot) -> String {
     let lacks = match slot {
         Slot::Lights => "no delta light",
         Slot::Environment | Slot::EnvironmentCdf => "no image as environment",
+        Slot::Emitters | Slot::EmitterCdf => "no triangle emits light",
+        Slot::Texels | Slot::Textures | Slot::Coordinates => "no texture",
+        Slot::Profiles => "no material has the table model",
+        Slot::Thickness => "no profile depends on the curvature",
         Slot::Probes | Slot::HitLists => "no surface is translucent",
         Slot::BatchSums => "no variance is asked for",
         Slot::Counters => "steps are counted in tests and benchmarks only",

@@ -41,23 +41,23 @@ fn marble() -> Matter {
 fn the_furnace_closes_at_every_angle() {
     let white = json!({"sigma_s_prime": 1, "sigma_a": 0, "unit": "1/mm", "ior": 1.3});
     let white = Matter::new("white", white, Model::Standard).expect("valid");
-    let figure = run(measure::furnace, std::slice::from_ref(&white), 0.05);
-    check(&figure, 15, 3e-3);
+    let figure = run(measure::furnace, std::slice::from_ref(&white), 0.02);
+    check(&figure, 15, 5e-3);
     assert!(figure.points().all(|point| point.expected == 1.0));
     // All that is lost lies beyond the body.
     assert!(white.lost() < 5e-4);
-    let figure = run(measure::furnace, &[marble()], 0.05);
-    check(&figure, 45, 5e-3);
+    let figure = run(measure::furnace, &[marble()], 0.01);
+    check(&figure, 45, 1e-2);
 }
 
 #[test]
 fn spheres_gather_the_mass_within_their_diameter() {
-    check(&run(measure::sphere, &[marble()], 0.2), 66, 0.3);
+    check(&run(measure::sphere, &[marble()], 0.13), 66, 0.4);
 }
 
 #[test]
 fn the_edge_follows_its_closed_form() {
-    check(&run(measure::edge, &[marble()], 0.1), 72, 0.03);
+    check(&run(measure::edge, &[marble()], 0.03), 72, 0.05);
 }
 
 #[test]
@@ -94,12 +94,12 @@ fn drawn_radii_follow_the_profile() {
 
 #[test]
 fn a_searchlight_shows_the_profile_and_the_walk_its_error() {
-    let figure = run(measure::searchlight, &[marble()], 0.06);
+    let figure = run(measure::searchlight, &[marble()], 0.03);
     check(&Figure { panels: vec![], ..figure.clone() }, 0, 0.0);
     let [model, walk] = &figure.panels[0].series[..] else { panic!("model and walk") };
     for point in &model.points {
         assert!(point.deviation().abs() < 5.0, "{point:?}");
-        assert!(point.error < 0.3 * point.measured, "{point:?} is vague");
+        assert!(point.error < 0.4 * point.measured, "{point:?} is vague");
     }
     // By an independent Monte Carlo the standard dipole is 56 % above the truth at one mean free path and 17 % below at
     // four; the rings' middles are not quite there.

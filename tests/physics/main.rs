@@ -7,6 +7,7 @@ mod density;
 mod edge;
 mod light;
 mod models;
+mod model_errors;
 mod plane;
 mod profile;
 mod random;

@@ -1,0 +1,147 @@
+//! Which profile a material gets, and why: the setting, else what its file says, else what is recommended.
+//!
+//! # What is recommended
+//! What the scene requires, no more. Of the models that are built, with the [errors](errors) that a random walk shows:
+//!
+//! - The error that a pixel can show is the model's error of the total, and of the light that it puts in the wrong place
+//!   the part min(1, m / p) that crosses a pixel of width p, where m is the mean distance that light travels inside.
+//! - The diffusion model with the least such error is enough where that is at most [`ENOUGH`].
+//! - Else the tabulated profile.
+//!
+//! # How light spreads below a pixel
+//! Across the edge of a shadow, m / pi of the light of a unit of its length changes sides (the mean of |x| is 2 m / pi
+//! for a radial profile, and half of it lies on either side), so of the light in the pixel m / (pi p).
+
+pub mod errors;
+mod grid;
+
+use crate::reference::profile::{self, Coefficients, Dipole, Profile, Radial};
+use crate::scene::{Material, Medium};
+use crate::settings::{Model, Settings};
+use errors::Error;
+
+/// Whether `auto` follows the recommendation, or is the standard dipole.
+const RECOMMENDED: bool = false;
+
+/// Error that a diffusion model may show.
+const ENOUGH: f64 = 0.05;
+
+/// Errors from which on a model's choice brings a warning: of the total, and of place or amount.
+const WARNED: Error = Error { total: 0.1, l1: 0.3 };
+
+/// A model that was chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// Never [`Model::Auto`].
+    pub model: Model,
+    /// Who chose it, for people.
+    pub why: String,
+}
+
+/// A choice with what is known about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Advice {
+    pub choice: Choice,
+    /// What would be recommended.
+    pub recommended: Choice,
+    /// Error of the chosen model on a plane, of the channel where it is largest; none where it is not known.
+    pub error: Option<Error>,
+    /// Where that is too much to go unsaid.
+    pub warning: Option<String>,
+}
+
+/// The model of a medium, where nothing is known of the picture.
+pub fn resolve(settings: &Settings, medium: &Medium) -> Choice {
+    let asked = |model: Option<Model>, why: &str| {
+        model.filter(|&model| model != Model::Auto).map(|model| Choice { model, why: why.into() })
+    };
+    asked(Some(settings.model), "as the settings ask").or_else(|| asked(medium.model, "as the file asks")).unwrap_or(
+        Choice { model: Model::Standard, why: "the standard dipole unless something else is asked for".into() },
+    )
+}
+
+/// The model of a material whose nearest pixels are `footprint` wide (m); none for an opaque one.
+pub fn advise(settings: &Settings, material: &Material, footprint: f64) -> Option<Advice> {
+    let medium = material.medium.as_ref()?;
+    let channels: Vec<Coefficients> = (0..3).map(|c| Coefficients::of(medium, material.ior, c)).collect();
+    let recommended = recommend(&channels, footprint);
+    let asked = settings.model != Model::Auto || medium.model.is_some_and(|model| model != Model::Auto);
+    let choice = if RECOMMENDED && !asked { recommended.clone() } else { resolve(settings, medium) };
+    let error = worst(&channels, choice.model);
+    let warning = error.filter(|error| error.l1 > WARNED.l1 || error.total.abs() > WARNED.total).map(|error| {
+        let (name, model) = (&material.name, choice.model);
+        let advice =
+            if recommended.model == model { String::new() } else { format!("; {} errs less", recommended.model) };
+        format!("{name}: a plane with the {model} model {error}{advice}")
+    });
+    Some(Advice { choice, recommended, error, warning })
+}
+
+/// What `auto` means for matter in pixels of this width (m).
+fn recommend(channels: &[Coefficients], footprint: f64) -> Choice {
+    let spread = channels.iter().map(mean_distance).fold(0.0, f64::max);
+    let seen = |error: Error| {
+        let total = error.total.abs();
+        total + (error.l1 - total).max(0.0) * (spread / footprint).min(1.0)
+    };
+    let diffusion = [Model::Standard, Model::Better, Model::Burley];
+    let known = diffusion.into_iter().filter_map(|model| Some((model, worst(channels, model)?)));
+    let Some((model, error)) = known.min_by(|a, b| seen(a.1).total_cmp(&seen(b.1))) else {
+        return Choice { model: Model::Standard, why: "matter that does not scatter has no profile".into() };
+    };
+    let shown = format!(
+        "in pixels of {}, light that travels {} on average shows {:.0} % of error",
+        length(footprint),
+        length(spread),
+        100.0 * seen(error)
+    );
+    if seen(error) <= ENOUGH || profile::constant(Model::Table).is_none() {
+        Choice { model, why: format!("the diffusion model that errs least: {shown}") }
+    } else {
+        Choice { model: Model::Table, why: format!("diffusion is not enough: {shown} with {model}") }
+    }
+}
+
+/// The error of the channel in which a model errs most; none if it is not built, not known, or nothing scatters.
+fn worst(channels: &[Coefficients], model: Model) -> Option<Error> {
+    profile::constant(model)?;
+    let scattering = channels.iter().filter(|channel| channel.sigma_s_prime > 0.0);
+    let errors = scattering.map(|channel| {
+        let albedo = channel.sigma_s_prime / (channel.sigma_s_prime + channel.sigma_a);
+        errors::of(model, albedo, channel.ior)
+    });
+    errors.collect::<Option<Vec<_>>>()?.into_iter().max_by(|a, b| a.l1.total_cmp(&b.l1))
+}
+
+/// Mean distance between where light enters and leaves a plane, by the standard dipole; but for the millionth that goes
+/// farthest, which without absorption would make it infinite. In the unit of the coefficients.
+fn mean_distance(channel: &Coefficients) -> f64 {
+    if channel.sigma_s_prime <= 0.0 {
+        return 0.0;
+    }
+    let dipole = Dipole::new(channel.sigma_s_prime, channel.sigma_a, channel.ior);
+    let (near, far) = (1e-3 * dipole.z_real, dipole.radius_beyond(1e-6));
+    // The mean is the integral of what lies beyond r.
+    const STEPS: u32 = 256;
+    let step = (far / near).ln() / f64::from(STEPS);
+    let beyond = |i: u32| {
+        let r = near * ((f64::from(i) + 0.5) * step).exp();
+        dipole.outside(r) / dipole.mass() * r * step
+    };
+    near + (0..STEPS).map(beyond).sum::<f64>()
+}
+
+/// A length of metres in words.
+fn length(metres: f64) -> String {
+    match metres {
+        m if m < 1e-3 => format!("{:.3} mm", m * 1e3),
+        m if m < 1.0 => format!("{:.2} mm", m * 1e3),
+        m => format!("{m:.2} m"),
+    }
+}
+
+/// The cumulative profile of a model on a plane under a perpendicular beam, lengths in the unit of the coefficients.
+pub(crate) fn beam(model: Model, matter: &Coefficients) -> Option<impl Fn(f64) -> f64> {
+    let profile = Profile::new(profile::constant(model)?, matter);
+    Some(move |r: f64| if r.is_finite() { profile.cdf(r) } else { profile.total() })
+}
