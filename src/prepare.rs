@@ -299,8 +299,7 @@ fn materials(
         let model = advice.as_ref().map_or(settings.model, |advice| advice.choice.model);
         Settings { model, ..settings.clone() }
     };
-    let each =
-        |(m, advice): (&scene::Material, &Option<Advice>)| material(m, scene.frame, &chosen(advice), profiles);
+    let each = |(m, advice): (&scene::Material, &Option<Advice>)| material(m, scene.frame, &chosen(advice), profiles);
     let mut out = scene.materials.iter().zip(advice).map(each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
         out[index].ramp = out.len() as u32;
