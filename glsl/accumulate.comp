@@ -7,6 +7,7 @@
 #include "profile.glsl"
 #include "texture.glsl"
 #include "boundary.glsl"
+#include "rough.glsl"
 #include "projection.glsl"
 #include "intersect.glsl"
 #include "light.glsl"
@@ -177,14 +178,14 @@ void main() {
             if (k >= first_direction || found == target) hit_count = 0u;
         }
         if (open && hit_count == 0u) {
-            light *= transmittance(m.ior, cos_shading);
+            light *= crossing(m, cos_shading);
             if (has_model(m, MODEL_TABLE)) light *= table_obliqueness(m, cos_shading, false);
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }
     }
 
-    vec3 radiance = transmittance(m.ior, dot(s.shading_normal, s.wo)) * factor * entering;
+    vec3 radiance = crossing(m, dot(s.shading_normal, s.wo)) * factor * entering;
     if (has_model(m, MODEL_TABLE)) radiance *= table_obliqueness(m, dot(s.shading_normal, s.wo), true);
     // The base colour tints what crosses the surface, there and here.
     if (has_texture(TEXTURE_BASE_COLOR)) {

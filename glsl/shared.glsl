@@ -21,6 +21,8 @@ const float SHADOW_OFFSET = 3.8146973e-6;
 // Part of the way to a point of an emitter that must be free: what stands between the rest, 4e-6 of the distance, and
 // another triangle of the emitter that rounding puts there, casts no shadow.
 const float EMITTER_REACH = 0.9999962;
+// Values of a rough boundary's transmittance, at cosines (i / (BOUNDARY_NODES - 1))^2.
+const uint BOUNDARY_NODES = 128u;
 // Least GGX width of an opaque material, which has no mirror.
 const float OPAQUE_ALPHA_MIN = 0.001;
 // Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
@@ -133,6 +135,8 @@ layout(constant_id = 3) const uint BATCHED = 0;
 layout(constant_id = 4) const uint COUNT_STEPS = 0;
 // 1 where triangles emit light.
 layout(constant_id = 6) const uint EMISSIVE = 0;
+// 1 where a translucent material is rough.
+layout(constant_id = 9) const uint ROUGH = 0;
 // Bit k is set where a material has a texture of kind k (TEXTURE_*).
 layout(constant_id = 7) const uint TEXTURED = 0;
 // Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
@@ -289,6 +293,8 @@ struct Material {
     uint flags;
     // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
     uint ramp;
+    // 1 + the number of its table in Boundaries; 0 for a smooth boundary.
+    uint boundary;
 };
 
 // One texture of a material. Texel (0, 0) is the upper left one, at the coordinates (0, 0).
@@ -450,5 +456,7 @@ struct Pixel {
 #define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { float profiles[]; }
 // At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
 #define THICKNESS(access) layout(set = 0, binding = 21, scalar) access buffer ThicknessBlock { vec3 thickness[]; }
+// BOUNDARY_NODES values of the transmittance of each rough boundary.
+#define BOUNDARIES(access) layout(set = 0, binding = 22, scalar) access buffer BoundariesBlock { float boundaries[]; }
 
 layout(push_constant, scalar) uniform StepBlock { Step step_; };

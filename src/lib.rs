@@ -29,7 +29,8 @@
 //! file ─ scene ─► Scene ── prepare ─► Features ──────────────────────────────► kernels, specialised
 //!   (checked, f64 metres;  (f32,      Nodes Triangles Shadings Materials
 //!    geometry centred and   internal  Lights Environment EnvironmentCdf ─────► buffers   per scene
-//!    scaled)                units)    View ──────────────────────────────────► buffer    per render
+//!    scaled)                units)    Emitters EmitterCdf Boundaries
+//!                                     View ──────────────────────────────────► buffer    per render
 //!
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
 //!   primary                       sample         reproject       accumulate, reflect             resolve

@@ -6,6 +6,7 @@ use crate::{
     reference::{
         Inputs, emitter, light,
         profile::{self, Coefficients, Dipole, Radial},
+        rough::Boundaries,
         texture,
     },
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap},
@@ -23,6 +24,8 @@ pub struct Prepared {
     pub lights: Vec<Light>,
     pub emitters: Vec<Emitter>,
     pub emitter_cdf: Vec<f32>,
+    /// Tables of rough boundaries.
+    pub boundaries: Vec<f32>,
     pub environment: Vec<Vec3>,
     pub environment_cdf: Vec<f32>,
     /// Texels and textures as their slots hold them; none without textures.
@@ -65,6 +68,7 @@ impl Prepared {
             lights: &self.lights,
             emitters: &self.emitters,
             emitter_cdf: &self.emitter_cdf,
+            boundaries: &self.boundaries,
             environment: &self.environment,
             environment_cdf: &self.environment_cdf,
             texels: &self.texels,
@@ -133,8 +137,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
     let footprint = footprint(&camera, frame, height);
     let advice: Vec<_> = scene.materials.iter().map(|m| model::advise(settings, m, footprint)).collect();
-    let mut profiles = vec![];
-    let materials = materials(scene, settings, &advice, &mut profiles)?;
+    let (mut profiles, mut boundaries) = (vec![], Boundaries::default());
+    let materials = materials(scene, settings, &advice, &mut profiles, &mut boundaries)?;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
@@ -186,6 +190,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         models,
         emitters: u32::from(emits),
         textures: kinds,
+        rough: u32::from(!boundaries.nodes.is_empty()),
         ..Features::default()
     };
     Ok(Prepared {
@@ -202,6 +207,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         lights,
         emitters,
         emitter_cdf,
+        boundaries: boundaries.nodes,
         environment,
         environment_cdf,
         texels,
@@ -294,12 +300,15 @@ fn materials(
     settings: &Settings,
     advice: &[Option<Advice>],
     profiles: &mut Vec<f32>,
+    boundaries: &mut Boundaries,
 ) -> Result<Vec<Material>> {
     let chosen = |advice: &Option<Advice>| {
         let model = advice.as_ref().map_or(settings.model, |advice| advice.choice.model);
         Settings { model, ..settings.clone() }
     };
-    let each = |(m, advice): (&scene::Material, &Option<Advice>)| material(m, scene.frame, &chosen(advice), profiles);
+    let each = |(m, advice): (&scene::Material, &Option<Advice>)| {
+        material(m, scene.frame, &chosen(advice), profiles, boundaries)
+    };
     let mut out = scene.materials.iter().zip(advice).map(each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
         out[index].ramp = out.len() as u32;
@@ -311,7 +320,7 @@ fn materials(
         let first = out.len();
         for medium in &authored.ramp {
             let node = scene::Material { medium: Some(medium.clone()), ..authored.clone() };
-            out.push(material(&node, scene.frame, &chosen(&advice[index]), profiles)?);
+            out.push(material(&node, scene.frame, &chosen(&advice[index]), profiles, boundaries)?);
         }
         // Black matter has no lengths of its own.
         let mut next = out[first + 1];
@@ -391,14 +400,21 @@ fn material(
     frame: Frame,
     settings: &Settings,
     profiles: &mut Vec<f32>,
+    boundaries: &mut Boundaries,
 ) -> Result<Material> {
+    let alpha = material.roughness * material.roughness;
+    let alpha = if alpha < f64::from(shared::MIRROR_ALPHA) { 0.0 } else { alpha as f32 };
     let mut out = match &material.medium {
         None => Material::default(),
         Some(medium) => {
             let model = model::resolve(settings, medium).model;
             let constant = profile::constant(model)
                 .ok_or_else(|| Error::setting("model", format!("the {model} model is not built yet")))?;
-            let coefficients = [0, 1, 2].map(|c| coefficients(medium, material.ior, frame.scale, c));
+            let rough = (alpha > 0.0).then(|| boundaries.add(alpha.into(), material.ior));
+            let coefficients = [0, 1, 2].map(|c| Coefficients {
+                rough: rough.map(|(_, reflectance)| reflectance),
+                ..coefficients(medium, material.ior, frame.scale, c)
+            });
             let options = profile::Options {
                 normalisation: settings.normalisation,
                 radius_tail: settings.radius_tail,
@@ -410,6 +426,7 @@ fn material(
                 profile::material(constant, &coefficients, options)
             };
             out.radius_max = out.radius_max.min(SET_DIAMETER);
+            out.boundary = rough.map_or(0, |(table, _)| table);
             if settings.projection == Projection::Camera && out.component_cdf[8] > 0.0 && out.camera_rate <= 0.0 {
                 let problem = format!(
                     "camera needs sigma_tr > 0 in every channel, but material \"{}\" ({}) absorbs nothing in one; use mis or normal",
@@ -425,8 +442,7 @@ fn material(
         out.strength *= (material.base_color * material.base_color).as_vec3();
     }
     out.ior = material.ior as f32;
-    let alpha = material.roughness * material.roughness;
-    out.alpha = if alpha < f64::from(shared::MIRROR_ALPHA) { 0.0 } else { alpha as f32 };
+    out.alpha = alpha;
     out.base_color = material.base_color.as_vec3();
     out.metallic = material.metallic as f32;
     out.emission = material.emission.as_vec3();

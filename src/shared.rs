@@ -185,6 +185,8 @@ constants! {
     /// Part of the way to a point of an emitter that must be free: what stands between the rest, 4e-6 of the distance, and
     /// another triangle of the emitter that rounding puts there, casts no shadow.
     EMITTER_REACH: f32 = 0.999_996_2;
+    /// Values of a rough boundary's transmittance, at cosines (i / (BOUNDARY_NODES - 1))^2.
+    BOUNDARY_NODES: u32 = 128;
     /// Least GGX width of an opaque material, which has no mirror.
     OPAQUE_ALPHA_MIN: f32 = 1e-3;
     /// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
@@ -446,6 +448,8 @@ structs! {
         flags: u32,
         /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
         ramp: u32,
+        /// 1 + the number of its table in Boundaries; 0 for a smooth boundary.
+        boundary: u32,
     }
 
     /// One texture of a material. Texel (0, 0) is the upper left one, at the coordinates (0, 0).
@@ -609,6 +613,8 @@ buffers! {
     Profiles = 20: PROFILES [f32] profiles;
     /// At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
     Thickness = 21: THICKNESS [Vec3] thickness;
+    /// BOUNDARY_NODES values of the transmittance of each rough boundary.
+    Boundaries = 22: BOUNDARIES [f32] boundaries;
 }
 
 features! {
@@ -622,6 +628,8 @@ features! {
     counters = 4: COUNT_STEPS,
     /// 1 where triangles emit light.
     emitters = 6: EMISSIVE,
+    /// 1 where a translucent material is rough.
+    rough = 9: ROUGH,
     /// Bit k is set where a material has a texture of kind k (TEXTURE_*).
     textures = 7: TEXTURED,
     /// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.

@@ -83,7 +83,8 @@ fn absorption(albedo: f64) -> f64 {
 
 /// The error of a model against what was walked for an albedo; none for one that is not built.
 pub fn measure(model: Model, albedo: f64, ior: f64, walked: &Searchlight) -> Option<Error> {
-    let matter = Coefficients { sigma_s_prime: 1.0, sigma_a: absorption(albedo), g: 0.0, ior, appearance: None };
+    let matter =
+        Coefficients { sigma_s_prime: 1.0, sigma_a: absorption(albedo), g: 0.0, ior, rough: None, appearance: None };
     let cdf = beam(model, &matter)?;
     let (mut l1, mut inside) = (0.0, 0.0);
     for (ends, ring) in walked.radii.windows(2).zip(&walked.rings) {

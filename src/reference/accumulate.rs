@@ -18,19 +18,19 @@
 //!
 //! The exponentials of density and profile are one, so that neither overflows.
 
-use super::boundary::transmittance;
 use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::pixel::position;
 use super::profile::{self, Directional, Matter, shapes, shapes_shifted};
 use super::projection::{Seen, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal};
 use super::random::{batch, key, scramble, sobol, unit};
+use super::rough::crossing;
 use super::sample::coordinate;
 use super::sums::Contribution;
 use super::{Inputs, emitter, intersect, texture};
 use crate::shared::{
     BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, MODEL_DIRECTIONAL,
-    PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
+    Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -94,12 +94,11 @@ pub fn accumulate(
         return Contribution::default();
     };
     let delta = delta(probe, hits, chosen);
-    let ior = f64::from(matter.material.ior);
     let point = surface.position.as_dvec3() + delta;
-    let entry = Entry::new(inputs, ior, seen.side, point, hits.triangle[chosen]);
+    let entry = Entry::new(inputs, matter.material, seen.side, point, hits.triangle[chosen]);
     let leaving = entry.tint
         * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
-        * transmittance(ior, seen.shading_normal.dot(seen.wo))
+        * crossing(inputs, matter.material, seen.shading_normal.dot(seen.wo))
         * profile::obliqueness(matter, seen.shading_normal.dot(seen.wo), true);
     let given = inputs.features.projection == PROJECTION_CAMERA;
     let exponent = if given { f64::from(matter.material.camera_rate) * f64::from(probe.radius) } else { 0.0 };
@@ -194,32 +193,34 @@ fn given_factor(matter: Matter, seen: &Seen, probe: &Probe, delta: DVec3, normal
 }
 
 /// A point where light enters.
-struct Entry {
+struct Entry<'a> {
+    inputs: &'a Inputs<'a>,
+    material: &'a Material,
     point: DVec3,
     /// Geometric normal on the camera's side of xo.
     normal: DVec3,
     /// Interpolated normal on that side.
     shading: DVec3,
-    ior: f64,
     /// Base colour where the light crosses the surface.
     tint: DVec3,
     /// Weights of the second and third vertex.
     weights: DVec2,
 }
 
-impl Entry {
-    fn new(inputs: &Inputs, ior: f64, side: f64, point: DVec3, triangle: u32) -> Entry {
+impl<'a> Entry<'a> {
+    fn new(inputs: &'a Inputs<'a>, material: &'a Material, side: f64, point: DVec3, triangle: u32) -> Entry<'a> {
         let shape = &inputs.triangles[triangle as usize];
         let weights = barycentric(shape, point);
         let shading = side * shading_normal(inputs, triangle, weights);
         let tint = tint(inputs, triangle, weights);
-        Entry { point, normal: side * geometric_normal(shape), shading, ior, tint, weights }
+        let normal = side * geometric_normal(shape);
+        Entry { inputs, material, point, normal, shading, tint, weights }
     }
 
     /// Ft(wi) cos; 0 below either horizon.
     fn transmission(&self, wi: DVec3) -> f64 {
         let cos = self.shading.dot(wi);
-        if self.normal.dot(wi) > 0.0 && cos > 0.0 { transmittance(self.ior, cos) * cos } else { 0.0 }
+        if self.normal.dot(wi) > 0.0 && cos > 0.0 { crossing(self.inputs, self.material, cos) * cos } else { 0.0 }
     }
 }
 

@@ -38,13 +38,16 @@ pub struct Matter {
     pub model: Model,
 }
 
-/// A light without extent.
+/// A light.
 #[derive(Clone, Copy, Debug)]
 pub enum Lamp {
     /// Intensity [W/sr].
     Point { position: DVec3, intensity: DVec3 },
     /// Direction of travel (unit), perpendicular irradiance [W/m^2].
     Directional { direction: DVec3, irradiance: DVec3 },
+    /// The side from which the corners run counter-clockwise shines, or both [W/(m^2 sr)]. It stops light only if it is
+    /// among the blockers.
+    Triangle { corners: Corners, radiance: DVec3, two_sided: bool },
 }
 
 /// What is integrated.
@@ -309,10 +312,7 @@ impl<'a> Surface<'a> {
         let pick = rng.next() * self.area;
         let index = self.areas.partition_point(|&sum| sum <= pick).min(self.areas.len() - 1);
         let [a, b, c] = self.setting.set[index];
-        let (mut s, mut t) = (rng.next(), rng.next());
-        if s + t > 1.0 {
-            (s, t) = (1.0 - s, 1.0 - t);
-        }
+        let (s, t) = inside(rng);
         (a + (b - a) * s + (c - a) * t, (b - a).cross(c - a).normalize())
     }
 
@@ -336,6 +336,15 @@ impl<'a> Surface<'a> {
                     let to = position - x;
                     intensity * lit(to.normalize(), to.length()) / to.length_squared()
                 }
+                Lamp::Triangle { corners: [a, b, c], radiance, two_sided } => {
+                    let (s, t) = inside(rng);
+                    let to = a + (b - a) * s + (c - a) * t - x;
+                    let wi = to.normalize();
+                    // The area as it is seen from x.
+                    let seen = -(b - a).cross(c - a).dot(wi) / 2.0;
+                    let seen = if two_sided { seen.abs() } else { seen.max(0.0) };
+                    radiance * (seen / to.length_squared() * lit(wi, to.length() - 10.0 * SHADOW_OFFSET))
+                }
             };
         }
         if self.setting.surrounding != DVec3::ZERO {
@@ -351,6 +360,12 @@ impl<'a> Surface<'a> {
         }
         sum
     }
+}
+
+/// Weights of the second and third corner of a point uniform over a triangle.
+fn inside(rng: &mut Random) -> (f64, f64) {
+    let (s, t) = (rng.next(), rng.next());
+    if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) }
 }
 
 /// A tree of boxes, split at the median of the longest side.

@@ -19,6 +19,7 @@ pub mod random;
 pub mod reflect;
 pub mod reproject;
 pub mod resolve;
+pub mod rough;
 pub mod sample;
 pub mod sums;
 pub mod texture;
@@ -49,6 +50,8 @@ pub struct Inputs<'a> {
     pub environment: &'a [Vec3],
     /// Its sampling table; see [`Slot::EnvironmentCdf`](crate::shared::Slot::EnvironmentCdf).
     pub environment_cdf: &'a [f32],
+    /// Tables of rough boundaries; see [`rough`].
+    pub boundaries: &'a [f32],
     /// Texels, textures and coordinates as their [slots](crate::shared::Slot) hold them; empty in scenes without textures.
     pub texels: &'a [u32],
     pub textures: &'a [Texture],

@@ -360,6 +360,7 @@ fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u
         (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
         (Slot::Emitters, bytemuck::cast_slice(&prepared.emitters)),
         (Slot::EmitterCdf, bytemuck::cast_slice(&prepared.emitter_cdf)),
+        (Slot::Boundaries, bytemuck::cast_slice(&prepared.boundaries)),
         (Slot::Environment, bytemuck::cast_slice(&prepared.environment)),
         (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
         (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),

@@ -25,6 +25,7 @@ pub struct World {
     pub lights: Vec<Light>,
     pub emitters: Vec<Emitter>,
     pub emitter_cdf: Vec<f32>,
+    pub boundaries: Vec<f32>,
     pub environment: Vec<Vec3>,
     pub environment_cdf: Vec<f32>,
     pub texels: Vec<u32>,
@@ -69,6 +70,7 @@ impl World {
             lights: &self.lights,
             emitters: &self.emitters,
             emitter_cdf: &self.emitter_cdf,
+            boundaries: &self.boundaries,
             environment: &self.environment,
             environment_cdf: &self.environment_cdf,
             texels: &self.texels,
@@ -153,7 +155,14 @@ pub fn modelled_as(model: Model, matter: &[Coefficients; 3], options: Options) -
 
 /// Three channels of isotropic matter.
 pub fn channels(sigma_s: DVec3, sigma_a: DVec3, ior: f64) -> [Coefficients; 3] {
-    [0, 1, 2].map(|c| Coefficients { sigma_s_prime: sigma_s[c], sigma_a: sigma_a[c], g: 0.0, ior, appearance: None })
+    [0, 1, 2].map(|c| Coefficients {
+        sigma_s_prime: sigma_s[c],
+        sigma_a: sigma_a[c],
+        g: 0.0,
+        ior,
+        rough: None,
+        appearance: None,
+    })
 }
 
 /// sigma_s' and sigma_a: sigma_tr = sqrt(3 (1 - albedo)) sigma_t'.

@@ -48,6 +48,7 @@ impl Experiment {
             Lamp::Directional { direction, irradiance } => {
                 (json!({"type": "directional", "intensity": irradiance.x}), DVec3::ZERO, *direction)
             }
+            Lamp::Triangle { .. } => unreachable!("emitters are meshes"),
         };
         self.lamps.iter().map(light).collect()
     }

@@ -55,7 +55,7 @@ pub fn bench() -> MutexGuard<'static, Bench> {
 impl Bench {
     /// What kernels read of `inputs`, and `buffers`, on the device.
     pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Loaded {
-        let fixed: [(Slot, &[u8]); 14] = [
+        let fixed: [(Slot, &[u8]); 15] = [
             (Slot::Views, bytemuck::bytes_of(inputs.view)),
             (Slot::Nodes, bytemuck::cast_slice(nodes)),
             (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
@@ -64,6 +64,7 @@ impl Bench {
             (Slot::Lights, bytemuck::cast_slice(inputs.lights)),
             (Slot::Emitters, bytemuck::cast_slice(inputs.emitters)),
             (Slot::EmitterCdf, bytemuck::cast_slice(inputs.emitter_cdf)),
+            (Slot::Boundaries, bytemuck::cast_slice(inputs.boundaries)),
             (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
             (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),
             (Slot::Counters, &[0; 4]),

@@ -63,6 +63,7 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         lights: &[],
         emitters: &[],
         emitter_cdf: &[],
+        boundaries: &[],
         environment: &[],
         environment_cdf: &[],
         texels: &[],

@@ -61,6 +61,7 @@ fn random_material(model: u32, i: u32) -> Material {
             sigma_a: extinction * absorbed,
             g,
             ior,
+            rough: None,
             appearance: None,
         }
     });
@@ -260,7 +261,8 @@ fn golden_values_on_the_device() {
     let options = Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
     let mut sweep = Sweep { materials: vec![], arguments: vec![], directions: vec![] };
     for (i, ((sigma_s, sigma_a, g, ior), x, wi, no, _)) in cases.into_iter().enumerate() {
-        let matter = Coefficients { sigma_s_prime: sigma_s * (1.0 - g), sigma_a, g, ior, appearance: None };
+        let matter =
+            Coefficients { sigma_s_prime: sigma_s * (1.0 - g), sigma_a, g, ior, rough: None, appearance: None };
         sweep.materials.push(material(MODEL_DIRECTIONAL, &[matter; 3], options));
         sweep.arguments.push(x.as_vec3());
         sweep.directions.push(Shading {

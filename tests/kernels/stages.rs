@@ -38,11 +38,12 @@ fn cases() -> Vec<(String, Case)> {
         rotation: 40.0,
         scale: 0.3,
     };
-    // The animal and what it stands on shine.
+    // The animal and what it stands on shine; the animal is rough.
     let mut shining = demo.clone();
     for (index, material) in shining.materials.iter_mut().enumerate() {
         material.emission = DVec3::new(0.3, 0.2, 0.1) * (1 + 3 * index) as f64;
         material.two_sided = index == 0;
+        material.roughness = 0.6;
     }
     let mut cases = vec![];
     for environment in [None, Some(&image)] {

@@ -73,7 +73,7 @@ fn random_material(random: &mut Random, model: Model, projection: Projection) ->
         let absorbed = random.pick(&[1.0, 1.0 - 1e-6, uniform, uniform, 1e-3, least.max(0.5f64.powi(24)), least]);
         let g = random.pick(&[-0.999, 0.0, 0.0, 0.9, 0.999]);
         let (sigma_s_prime, sigma_a) = (extinction * (1.0 - absorbed), extinction * absorbed);
-        Coefficients { sigma_s_prime, sigma_a, g, ior, appearance: None }
+        Coefficients { sigma_s_prime, sigma_a, g, ior, rough: None, appearance: None }
     });
     let options = Options {
         normalisation: Normalisation::Energy,

@@ -16,7 +16,7 @@ const RADIAL: [u32; 3] = [MODEL_STANDARD, MODEL_BETTER, MODEL_BURLEY];
 
 /// Matter with sigma_t' = 1.
 fn matter(albedo: f64, ior: f64) -> Coefficients {
-    Coefficients { sigma_s_prime: albedo, sigma_a: 1.0 - albedo, g: 0.0, ior, appearance: None }
+    Coefficients { sigma_s_prime: albedo, sigma_a: 1.0 - albedo, g: 0.0, ior, rough: None, appearance: None }
 }
 
 fn cases() -> impl Iterator<Item = (String, Profile)> {
@@ -225,7 +225,7 @@ fn materials_return_their_total() {
 
 /// The directional dipole of matter given by its unreduced scattering.
 fn directional(sigma_s: f64, sigma_a: f64, g: f64, ior: f64, kappa: f64) -> Directional {
-    let matter = Coefficients { sigma_s_prime: sigma_s * (1.0 - g), sigma_a, g, ior, appearance: None };
+    let matter = Coefficients { sigma_s_prime: sigma_s * (1.0 - g), sigma_a, g, ior, rough: None, appearance: None };
     Directional::new(&matter, kappa)
 }
 

@@ -17,7 +17,7 @@ const OPTIONS: Options = Options {
 };
 
 fn matter(sigma_s_prime: f64, sigma_a: f64, ior: f64) -> Coefficients {
-    Coefficients { sigma_s_prime, sigma_a, g: 0.0, ior, appearance: None }
+    Coefficients { sigma_s_prime, sigma_a, g: 0.0, ior, rough: None, appearance: None }
 }
 
 /// Independent Monte Carlo: a pencil of light that entered along the normal into a half-space with a smooth boundary,

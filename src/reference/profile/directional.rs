@@ -240,7 +240,11 @@ impl Radial for Directional {
         material.height[c] = self.height as f32;
         material.free_path[c] = self.free_path as f32;
         material.floor[c] = (options.directional.kappa * self.free_path) as f32;
-        material.beam[c] = if scatters { (factor / (4.0 * PI * options.leaving(self.ior))) as f32 } else { 0.0 };
+        material.beam[c] = if scatters {
+            (factor / (4.0 * PI * options.leaving(diffuse_reflectance(self.ior, Side::Outside)))) as f32
+        } else {
+            0.0
+        };
         material.c_phi = self.c_phi as f32;
         material.c_e = self.c_e as f32;
     }

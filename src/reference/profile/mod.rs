@@ -57,6 +57,8 @@ pub struct Coefficients {
     pub g: f64,
     /// Index of refraction, inside over outside, > 0.
     pub ior: f64,
+    /// Diffuse reflectance from outside of a rough boundary; none for a smooth one, whose is exact.
+    pub rough: Option<f64>,
     /// The total (0 to 1) and length that an author gave in place of coefficients.
     pub appearance: Option<(f64, f64, LengthKind)>,
 }
@@ -69,7 +71,18 @@ impl Coefficients {
             sigma_a: medium.sigma_a[c],
             g: medium.g[c],
             ior,
+            rough: None,
             appearance: medium.appearance.map(|given| (given.albedo[c], given.length[c], given.kind)),
+        }
+    }
+
+    /// Diffuse reflectance of the boundary for light from `side`.
+    pub fn diffuse_reflectance(&self, side: Side) -> f64 {
+        match (self.rough, side) {
+            (None, side) => diffuse_reflectance(self.ior, side),
+            (Some(outside), Side::Outside) => outside,
+            // Light in equilibrium crosses alike from both sides.
+            (Some(outside), Side::Inside) => 1.0 - (1.0 - outside) / (self.ior * self.ior),
         }
     }
 
@@ -280,9 +293,9 @@ pub struct Options {
 
 impl Options {
     /// Exitance over the radiance that leaves without its factor Ft(wo): pi (1 - rho_e), or pi.
-    pub fn leaving(&self, ior: f64) -> f64 {
+    pub fn leaving(&self, rho_e: f64) -> f64 {
         match self.normalisation {
-            Normalisation::Energy => PI * (1.0 - diffuse_reflectance(ior, Side::Outside)),
+            Normalisation::Energy => PI * (1.0 - rho_e),
             Normalisation::Jensen2001 => PI,
         }
     }
@@ -297,7 +310,7 @@ pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> sha
     let channels = matter.each_ref().map(|matter| Profile::new(model, matter));
     let scattering = || channels.iter().filter(|c| c.strength() > 0.0);
     let probability = 1.0 / scattering().count().max(1) as f64;
-    let leaving = options.leaving(ior);
+    let leaving = options.leaving(matter[0].diffuse_reflectance(Side::Outside));
 
     let mut material = Material { model, ior: ior as f32, flags: TRANSLUCENT, ..Material::default() };
     let mut cumulative = 0.0;

@@ -40,8 +40,11 @@ pub struct Dipole {
 
 /// A of the boundary condition: (1 + rho_i) / (1 - rho_i).
 pub fn boundary_factor(ior: f64) -> f64 {
-    let rho = diffuse_reflectance(ior, Side::Inside);
-    (1.0 + rho) / (1.0 - rho)
+    factor(diffuse_reflectance(ior, Side::Inside))
+}
+
+fn factor(rho_i: f64) -> f64 {
+    (1.0 + rho_i) / (1.0 - rho_i)
 }
 
 impl Dipole {
@@ -49,6 +52,10 @@ impl Dipole {
     ///
     /// Matter that does not scatter has the albedo 0; its lengths are then arbitrary.
     pub fn new(sigma_s_prime: f64, sigma_a: f64, ior: f64) -> Dipole {
+        Dipole::with_factor(sigma_s_prime, sigma_a, boundary_factor(ior))
+    }
+
+    fn with_factor(sigma_s_prime: f64, sigma_a: f64, a: f64) -> Dipole {
         if sigma_s_prime <= 0.0 {
             return Dipole { albedo: 0.0, sigma_tr: 0.0, z_real: 1.0, z_virtual: 1.0 };
         }
@@ -58,12 +65,13 @@ impl Dipole {
             albedo: sigma_s_prime / sigma_t_prime,
             sigma_tr: (3.0 * sigma_a * sigma_t_prime).sqrt(),
             z_real,
-            z_virtual: z_real * (1.0 + 4.0 / 3.0 * boundary_factor(ior)),
+            z_virtual: z_real * (1.0 + 4.0 / 3.0 * a),
         }
     }
 
     pub(super) fn of(matter: &Coefficients) -> Dipole {
-        Dipole::new(matter.sigma_s_prime, matter.sigma_a, matter.ior)
+        let a = factor(matter.diffuse_reflectance(Side::Inside));
+        Dipole::with_factor(matter.sigma_s_prime, matter.sigma_a, a)
     }
 
     pub(super) fn unpack(matter: Matter, c: usize) -> Dipole {
