@@ -113,6 +113,7 @@ impl Sweep {
             profiles: &[],
             emitters: &[],
             emitter_cdf: &[],
+            boundaries: &[],
             thickness: &[],
         };
         let mut bench = bench();
