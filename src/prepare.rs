@@ -9,9 +9,9 @@ use crate::{
         rough::Boundaries,
         texture,
     },
-    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap},
-    settings::{Projection, Settings},
-    shared::{self, Emitter, Features, Light, Material, TRANSLUCENT, TWO_SIDED, Texture, View},
+    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap, curvature::curvatures},
+    settings::{Model, Projection, Settings},
+    shared::{self, Emitter, Features, Light, Material, TABLE_NODES, TRANSLUCENT, TWO_SIDED, Texture, View},
 };
 use glam::{DVec3, Vec3};
 
@@ -137,8 +137,9 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
     let footprint = footprint(&camera, frame, height);
     let advice: Vec<_> = scene.materials.iter().map(|m| model::advise(settings, m, footprint)).collect();
+    let thickness = thickness(scene, settings, &advice);
     let (mut profiles, mut boundaries) = (vec![], Boundaries::default());
-    let materials = materials(scene, settings, &advice, &mut profiles, &mut boundaries)?;
+    let materials = materials(scene, settings, &advice, &thickness, &mut profiles, &mut boundaries)?;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
@@ -191,6 +192,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         emitters: u32::from(emits),
         textures: kinds,
         rough: u32::from(!boundaries.nodes.is_empty()),
+        curvature: u32::from(!thickness.is_empty()),
         ..Features::default()
     };
     Ok(Prepared {
@@ -213,7 +215,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         texels,
         textures,
         profiles,
-        thickness: vec![],
+        thickness,
         advice,
         camera,
         rows: y0..y1,
@@ -299,6 +301,7 @@ fn materials(
     scene: &Scene,
     settings: &Settings,
     advice: &[Option<Advice>],
+    thickness: &[Vec3],
     profiles: &mut Vec<f32>,
     boundaries: &mut Boundaries,
 ) -> Result<Vec<Material>> {
@@ -307,7 +310,7 @@ fn materials(
         Settings { model, ..settings.clone() }
     };
     let each = |(m, advice): (&scene::Material, &Option<Advice>)| {
-        material(m, scene.frame, &chosen(advice), profiles, boundaries)
+        material(m, scene.frame, &chosen(advice), thickness, profiles, boundaries)
     };
     let mut out = scene.materials.iter().zip(advice).map(each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
@@ -320,7 +323,7 @@ fn materials(
         let first = out.len();
         for medium in &authored.ramp {
             let node = scene::Material { medium: Some(medium.clone()), ..authored.clone() };
-            out.push(material(&node, scene.frame, &chosen(&advice[index]), profiles, boundaries)?);
+            out.push(material(&node, scene.frame, &chosen(&advice[index]), thickness, profiles, boundaries)?);
         }
         // Black matter has no lengths of its own.
         let mut next = out[first + 1];
@@ -395,10 +398,31 @@ fn textures(scene: &Scene) -> (Vec<u32>, Vec<Texture>, u32) {
     (texels, textures, kinds)
 }
 
+/// Curvatures at the vertices of the triangles, if a material has the table model and settings ask for them.
+fn thickness(scene: &Scene, settings: &Settings, advice: &[Option<Advice>]) -> Vec<Vec3> {
+    let tabulated = |advice: &Option<Advice>| advice.as_ref().is_some_and(|a| a.choice.model == Model::Table);
+    let wanted: Vec<bool> = advice.iter().map(tabulated).collect();
+    if settings.curvature && wanted.contains(&true) { curvatures(scene, &wanted) } else { vec![] }
+}
+
+/// Radii 2^(i/2 - 1) of the spheres between which a material's profiles are interpolated: those around the curvatures of
+/// the scene, up to 128 mean free paths, beyond which the half-space is next.
+fn spheres(thickness: &[Vec3], channels: &[Coefficients; 3]) -> Vec<i32> {
+    let all = || thickness.iter().flat_map(|c| c.to_array()).filter(|&c| c > 0.0).map(f64::from);
+    let (Some(least), Some(most)) = (all().reduce(f64::min), all().reduce(f64::max)) else { return vec![] };
+    let longest = channels.iter().filter(|c| c.sigma_s_prime > 0.0).map(|c| 1.0 / c.sigma_s_prime).fold(0.0, f64::max);
+    let number = |radius: f64| 2.0 * (2.0 * radius).log2();
+    let last = number((1.0 / least).min(128.0 * longest)).ceil() as i32;
+    let first = number(1.0 / most).floor() as i32;
+    // Bodies thinner than the first are interpolated as it is.
+    (first.max(last - (TABLE_NODES as i32 - 2))..=last).collect()
+}
+
 fn material(
     material: &scene::Material,
     frame: Frame,
     settings: &Settings,
+    thickness: &[Vec3],
     profiles: &mut Vec<f32>,
     boundaries: &mut Boundaries,
 ) -> Result<Material> {
@@ -421,7 +445,7 @@ fn material(
                 directional: settings.directional,
             };
             let mut out = if constant == shared::MODEL_TABLE {
-                profile::tabulated(&coefficients, options, &[], profiles)
+                profile::tabulated(&coefficients, options, &spheres(thickness, &coefficients), profiles)
             } else {
                 profile::material(constant, &coefficients, options)
             };

@@ -120,6 +120,8 @@ pub struct Settings {
     /// Profile of every translucent material; `Auto` leaves it to each.
     pub model: Model,
     pub directional: Directional,
+    /// Lets the table model follow how thick the body is at each point; without, every body is a half-space to it.
+    pub curvature: bool,
     /// Key of all random numbers.
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
@@ -148,6 +150,7 @@ impl Default for Settings {
             normalisation: Normalisation::Energy,
             model: Model::Auto,
             directional: Directional::default(),
+            curvature: true,
             seed: 0,
             show_environment: false,
             variance: true,

@@ -181,6 +181,7 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         "renormalise": settings.directional.renormalise,
         "reciprocal": settings.directional.reciprocal,
         "kappa": settings.directional.kappa,
+        "curvature": settings.curvature,
         "radiusTail": settings.radius_tail,
         "showEnvironment": settings.show_environment,
     });

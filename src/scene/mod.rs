@@ -3,6 +3,7 @@
 mod accessor;
 mod bvh;
 mod camera;
+pub mod curvature;
 mod environment;
 mod frame;
 mod gltf;

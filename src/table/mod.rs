@@ -7,7 +7,8 @@
 //! # Where a table comes from
 //! For isotropic scattering and the indices of refraction [`SHIPPED_IORS`] the crate ships tables (`cargo run --release
 //! --example tables` makes them). Any other index or g is simulated when first needed: the half-space alone, some
-//! seconds of all cores, and kept in the [`cache`].
+//! seconds of all cores, and kept in the [`cache`]; what spheres change is taken from the shipped tables at the same reduced
+//! coefficients (similarity), between the nearest two indices.
 //!
 //! # Errors
 //! Relative L1 error of R(r), weighted by energy, against an independent Monte Carlo whose own noise is .3 %: .3 to .5 %
@@ -56,6 +57,15 @@ pub fn shipped(index: usize) -> Arc<White> {
     TABLES[index].clone()
 }
 
+/// The shipped tables around an index of refraction, with their weights.
+fn neighbours(ior: f64) -> [(Arc<White>, f64); 2] {
+    let last = SHIPPED_IORS.len() - 1;
+    let above = SHIPPED_IORS.partition_point(|&n| n < ior).clamp(1, last);
+    let (low, high) = (SHIPPED_IORS[above - 1], SHIPPED_IORS[above]);
+    let share = ((ior - low) / (high - low)).clamp(0.0, 1.0);
+    [(shipped(above - 1), 1.0 - share), (shipped(above), share)]
+}
+
 /// Walks of a table that is made when it is needed: a constant number of collisions, whatever g.
 pub fn walks(g: f64) -> u64 {
     (f64::from(1 << 18) * (1.0 - g).min(1.0)).max(f64::from(1 << 15)) as u64
@@ -76,7 +86,8 @@ pub fn table(ior: f64, g: f64) -> Arc<White> {
     let [ior, g] = [ior, g].map(|x| (x * 1e6).round() / 1e6);
     let mut made = MADE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let entry = made.entry((ior.to_bits(), g.to_bits()));
-    entry.or_insert_with(|| Arc::new(cache::table(cache::folder().as_deref(), ior, g, walks(g)))).clone()
+    let make = || cache::table(cache::folder().as_deref(), ior, g, walks(g)).curved(&neighbours(ior));
+    entry.or_insert_with(|| Arc::new(make())).clone()
 }
 
 /// One channel of matter with its table; none for matter that does not scatter.

@@ -22,6 +22,7 @@ use crate::reference::boundary::{Side, diffuse_reflectance, transmittance};
 use crate::reference::math::integrate;
 use crate::reference::profile::{Dipole, Radial, boundary_factor};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// e = sqrt(3 (1 - alpha')) of the tabulated albedos.
 pub const EXTENTS: [f64; 25] = [
@@ -117,6 +118,57 @@ impl White {
         White { ior, g, nodes: radii.iter().map(|&radius| Node::simulate(ior, g, radius, walks(radius))).collect() }
     }
 
+    /// A half-space with the spheres that the known tables have, weighted: R and the odds T : 1 - T of a total change with
+    /// the curvature as they do there, at the same albedo.
+    pub fn curved(mut self, known: &[(Arc<White>, f64)]) -> White {
+        let plane = self.nodes.pop().expect("a table has the half-space");
+        let spheres = known[0].0.nodes.len() - 1;
+        self.nodes = (0..spheres).map(|k| self.sphere(&plane, known, k)).collect();
+        self.nodes.push(plane);
+        self
+    }
+
+    /// Node k of the known tables for this matter.
+    fn sphere(&self, plane: &Node, known: &[(Arc<White>, f64)], k: usize) -> Node {
+        let radius = known[0].0.nodes[k].radius;
+        let mean = |f: &dyn Fn(&White) -> f64| known.iter().map(|(table, weight)| weight * f(table)).sum::<f64>();
+        let curve = |index: usize| {
+            let sigma_a = absorption(EXTENTS[index]);
+            let directly = |g: f64, ior: f64, radius: f64| {
+                Matter { sigma_s: 1.0 / (1.0 - g), sigma_a, g, ior }.directly(radius)
+            };
+            let flat = &plane.albedos[index];
+            let here = directly(self.g, self.ior, radius);
+            // Odds of a total there over those of the half-space.
+            let odds = |total: f64| (total / (1.0 - total).max(1e-12)).max(1e-300).ln();
+            let changed = |own: f64, f: &dyn Fn(&White, &Node) -> f64| {
+                let change = mean(&|table| odds(f(table, &table.nodes[k])) - odds(f(table, &table.nodes[spheres_of(table)])));
+                1.0 / (1.0 + (-odds(own) - change).exp())
+            };
+            let total = changed(flat.total.mean + directly(self.g, self.ior, f64::INFINITY), &|table, node| {
+                node.albedos[index].total.mean + directly(table.g, table.ior, node.radius)
+            });
+            let diffuse = changed(flat.diffuse.mean, &|_, node| node.albedos[index].diffuse.mean);
+            let shift = |cell: usize| {
+                mean(&|table| {
+                    let of = |node: usize| table.nodes[node].albedos[index].logarithm[cell];
+                    of(k) - of(spheres_of(table))
+                })
+            };
+            let reached = reached(radius);
+            let logarithm = (0..CELLS)
+                .map(|cell| if cell < reached { (flat.logarithm[cell] + shift(cell)).max(NOTHING) } else { NOTHING })
+                .collect();
+            Curve {
+                total: Estimate { mean: (total - here).max(0.0), error: flat.total.error },
+                diffuse: Estimate { mean: diffuse, error: flat.diffuse.error },
+                logarithm,
+                error: flat.error.clone(),
+            }
+        };
+        Node { radius, albedos: (0..EXTENTS.len()).map(curve).collect() }
+    }
+
     /// The profile at an albedo alpha', 0 to 1, on a sphere of the radius in units of 1 / sigma_s'.
     pub fn profile(&self, albedo: f64, radius: f64) -> Profile {
         let parts = self.parts(radius);
@@ -174,6 +226,11 @@ impl White {
         let stretch = |a: f64| if both { stretch(a, radius) } else { 1.0 };
         vec![(above - 1, weight, stretch(low)), (above, 1.0 - weight, stretch(high))]
     }
+}
+
+/// Index of a table's half-space.
+fn spheres_of(table: &White) -> usize {
+    table.nodes.len() - 1
 }
 
 /// Factor on distances that carries a sphere of the radius `to` to one of the radius `from`.
