@@ -13,7 +13,11 @@
 //!
 //! # Between nodes
 //! ln R is a cubic in e and in ln r^2. Between the radii a1 < a < a2 of spheres, R is linear in 1/a, each part stretched
-//! from its diameter to 2 a with its total kept, so that totals are linear in 1/a.
+//! from its diameter to 2 a: with c = a_k / a, h = 1/c - 1, q = (r / 2 a)^2, distances r become
+//!
+//!   r_k = r / (1 + h q),  d r_k^2 / d r^2 = (1 - h q) / (1 + h q)^3,
+//!
+//! which is 1 near the entry and ends at 2 a_k. So totals are linear in 1/a.
 
 use super::grid;
 use super::single::Matter;
@@ -292,9 +296,7 @@ fn smoothed(leaving: &Leaving, radius: f64, dipole: &Dipole) -> Curve {
     let mut logarithm = vec![NOTHING; CELLS];
     let good: Vec<usize> = (0..reached).filter(|&cell| error[cell] > 0.0 && error[cell] <= NOISY).collect();
     let longest = good.chunk_by(|a, b| a + 1 == *b).max_by_key(|run| run.len()).map(|run| (run[0], run[run.len() - 1]));
-    let Some((first, last)) = longest else {
-        return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error };
-    };
+    let Some((first, last)) = longest else { return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error } };
     for cell in first..=last {
         let window = cell.saturating_sub(3).max(first)..=(cell + 3).min(last);
         let [c0, c1, c2] = parabola(window.map(|i| {
@@ -344,7 +346,7 @@ fn parabola(points: impl Iterator<Item = (f64, f64, f64)>) -> [f64; 3] {
 #[derive(Clone, Debug, PartialEq)]
 struct Part {
     weight: f64,
-    /// Factor on distances.
+    /// Factor on the diameter.
     stretch: f64,
     reached: usize,
     /// Squared diameter.
@@ -378,10 +380,13 @@ impl Profile {
 
     /// The part that Monte Carlo gives.
     pub fn multiple(&self, r: f64) -> f64 {
-        self.parts
-            .iter()
-            .map(|part| part.weight * part.stretch.powi(2) * part.value(r * part.stretch, &self.dipole))
-            .sum()
+        let of = |part: &Part| {
+            let h = 1.0 / part.stretch - 1.0;
+            let q = if h == 0.0 { 0.0 } else { (r / (2.0 * self.radius)).powi(2) };
+            let area = (1.0 - h * q) / (1.0 + h * q).powi(3);
+            part.weight * area * part.value(r / (1.0 + h * q), &self.dipole)
+        };
+        self.parts.iter().map(of).sum()
     }
 
     /// Standard error of a cell's light at the distance r, relative to [`Profile::multiple`], before smoothing.
@@ -441,8 +446,7 @@ impl Part {
             // On spheres the last cell continues the line from the cell before.
             if self.end.is_finite() {
                 let slope = if last > 0 { self.logarithm[last] - self.logarithm[last - 1] } else { 0.0 };
-                let step =
-                    if last > 0 { (s / middle(last)).ln() / (middle(last) / middle(last - 1)).ln() } else { 0.0 };
+                let step = if last > 0 { (s / middle(last)).ln() / (middle(last) / middle(last - 1)).ln() } else { 0.0 };
                 return (self.logarithm[last] + slope * step).exp();
             }
             return self.logarithm[last].exp() * dipole.shape(r) / dipole.shape(middle(last).sqrt()).max(1e-300);
