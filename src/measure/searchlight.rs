@@ -46,17 +46,24 @@ pub fn searchlight(setup: &Setup) -> Result<Figure> {
 
     for matter in setup.matters {
         let matter = matter.grey(CHANNEL);
-        let profile = matter.profile(CHANNEL);
+        let inside = matter.beam(CHANNEL);
         let mut points = vec![];
         for ring in 0..RINGS {
             let (a, b) = (ends[ring], ends[ring + 1]);
             let (light, error) = lit_ring(setup, &matter, a, b)?;
-            let (area, expected) = (area(a, b), profile.cdf(b) - profile.cdf(a));
+            let (area, expected) = (area(a, b), inside(b) - inside(a));
             let [measured, error, expected] = [light, error, expected].map(|value| value / area);
             points.push(Point { x: middle(ring), measured, error, expected });
         }
-        let curve = fine.iter().map(|r| (*r, profile.rd(*r))).collect();
-        series.push(Series { name: matter.model.to_string(), points, curve }.as_far_as_known(&matter));
+        // A ring of a hundredth of its radius on either side.
+        let ring = |r: f64| (inside(1.01 * r) - inside(0.99 * r)) / area(0.99 * r, 1.01 * r);
+        let curve = fine.iter().map(|r| (*r, ring(*r))).collect();
+        let mut shown = Series { name: matter.model.to_string(), points, curve };
+        if matter.model == Model::Table {
+            // Its profile depends on the directions too.
+            shown = shown.as_far_as_known(&matter);
+        }
+        series.push(shown);
         notes.push(format!("{}: the body ends where {:.1e} of the light lies beyond", matter.model, matter.lost()));
     }
 
@@ -75,9 +82,7 @@ pub fn searchlight(setup: &Setup) -> Result<Figure> {
         series.push(Series { name: "random walk".into(), points: points.collect(), curve: vec![] });
         let Estimate { mean, error } = beam.total;
         notes.push(format!("random walk: {paths} paths, total {mean:.4} +- {error:.4}; models against it:"));
-        // The profile of the directional dipole is where its samples come from, not what it sends out.
-        let radial = setup.matters.iter().filter(|matter| matter.model != Model::Directional);
-        notes.extend(radial.map(|matter| errors(matter, path, beam)));
+        notes.extend(setup.matters.iter().map(|matter| errors(matter, path, beam)));
     }
     let panel = Panel {
         name: "searchlight".into(),
@@ -97,12 +102,12 @@ fn area(a: f64, b: f64) -> f64 {
 /// A model's errors against the walk: of the total; of all rings and what lies beyond, weighted by energy (L1); root mean
 /// square of the relative error of rings from .5 to 16 mean free paths.
 fn errors(matter: &Matter, path: f64, beam: &Searchlight) -> String {
-    let profile = matter.profile(CHANNEL);
-    let total = profile.total();
+    let inside = matter.beam(CHANNEL);
+    let total = inside(f64::INFINITY);
     let (mut l1, mut walked_inside, mut squares) = (0.0, 0.0, vec![]);
     for (ends, walked) in beam.radii.windows(2).zip(&beam.rings) {
         let (a, b) = (ends[0], ends[1]);
-        let (model, walked) = (profile.cdf(b) - profile.cdf(a), walked.mean * area(a, b));
+        let (model, walked) = (inside(b) - inside(a), walked.mean * area(a, b));
         l1 += (model - walked).abs();
         walked_inside += walked;
         let middle = (a * b).sqrt();
@@ -110,7 +115,7 @@ fn errors(matter: &Matter, path: f64, beam: &Searchlight) -> String {
             squares.push((model / walked - 1.0).powi(2));
         }
     }
-    let modelled_inside = profile.cdf(beam.radii[beam.radii.len() - 1]);
+    let modelled_inside = inside(beam.radii[beam.radii.len() - 1]);
     l1 += ((total - modelled_inside) - (beam.total.mean - walked_inside)).abs();
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     format!(

