@@ -68,14 +68,7 @@ fn middle(tree: &CwBvh, triangles: &[Triangle], index: usize) -> f64 {
 }
 
 /// Distance to the next surface of the set.
-fn length(
-    tree: &CwBvh,
-    triangles: &[Triangle],
-    set: u32,
-    from: usize,
-    origin: Vec3,
-    direction: DVec3,
-) -> Option<f64> {
+fn length(tree: &CwBvh, triangles: &[Triangle], set: u32, from: usize, origin: Vec3, direction: DVec3) -> Option<f64> {
     let ray = Ray::new(Vec3A::from(origin), direction.as_vec3a(), 0.0, f32::MAX);
     let mut hit = RayHit::none();
     tree.ray_traverse(ray, &mut hit, |ray, i| {

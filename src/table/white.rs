@@ -138,15 +138,15 @@ impl White {
         let mean = |f: &dyn Fn(&White) -> f64| known.iter().map(|(table, weight)| weight * f(table)).sum::<f64>();
         let curve = |index: usize| {
             let sigma_a = absorption(EXTENTS[index]);
-            let directly = |g: f64, ior: f64, radius: f64| {
-                Matter { sigma_s: 1.0 / (1.0 - g), sigma_a, g, ior }.directly(radius)
-            };
+            let directly =
+                |g: f64, ior: f64, radius: f64| Matter { sigma_s: 1.0 / (1.0 - g), sigma_a, g, ior }.directly(radius);
             let flat = &plane.albedos[index];
             let here = directly(self.g, self.ior, radius);
             // Odds of a total there over those of the half-space.
             let odds = |total: f64| (total / (1.0 - total).max(1e-12)).max(1e-300).ln();
             let changed = |own: f64, f: &dyn Fn(&White, &Node) -> f64| {
-                let change = mean(&|table| odds(f(table, &table.nodes[k])) - odds(f(table, &table.nodes[spheres_of(table)])));
+                let change =
+                    mean(&|table| odds(f(table, &table.nodes[k])) - odds(f(table, &table.nodes[spheres_of(table)])));
                 1.0 / (1.0 + (-odds(own) - change).exp())
             };
             let total = changed(flat.total.mean + directly(self.g, self.ior, f64::INFINITY), &|table, node| {
@@ -296,7 +296,9 @@ fn smoothed(leaving: &Leaving, radius: f64, dipole: &Dipole) -> Curve {
     let mut logarithm = vec![NOTHING; CELLS];
     let good: Vec<usize> = (0..reached).filter(|&cell| error[cell] > 0.0 && error[cell] <= NOISY).collect();
     let longest = good.chunk_by(|a, b| a + 1 == *b).max_by_key(|run| run.len()).map(|run| (run[0], run[run.len() - 1]));
-    let Some((first, last)) = longest else { return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error } };
+    let Some((first, last)) = longest else {
+        return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error };
+    };
     for cell in first..=last {
         let window = cell.saturating_sub(3).max(first)..=(cell + 3).min(last);
         let [c0, c1, c2] = parabola(window.map(|i| {
@@ -446,7 +448,8 @@ impl Part {
             // On spheres the last cell continues the line from the cell before.
             if self.end.is_finite() {
                 let slope = if last > 0 { self.logarithm[last] - self.logarithm[last - 1] } else { 0.0 };
-                let step = if last > 0 { (s / middle(last)).ln() / (middle(last) / middle(last - 1)).ln() } else { 0.0 };
+                let step =
+                    if last > 0 { (s / middle(last)).ln() / (middle(last) / middle(last - 1)).ln() } else { 0.0 };
                 return (self.logarithm[last] + slope * step).exp();
             }
             return self.logarithm[last].exp() * dipole.shape(r) / dipole.shape(middle(last).sqrt()).max(1e-300);

@@ -1,6 +1,6 @@
 //! The grid of model errors against random walks.
 
-use std::fmt::Write;
+use std::{f64::consts::PI, fmt::Write};
 use translucent::{
     Model,
     model::errors::{ALBEDOS, INDICES, measure, of, walk},
@@ -45,7 +45,7 @@ fn model_errors_are_what_a_random_walk_shows() {
         return;
     }
     let ior = 1.3;
-    let walked = walk(ior, 4_000, 99);
+    let walked = walk(ior, 20_000, 99);
     for (albedo, walked) in ALBEDOS.iter().zip(&walked) {
         for model in MODELS {
             let (Some(found), Some(said)) = (measure(model, *albedo, ior, walked), of(model, *albedo, ior)) else {
@@ -56,8 +56,12 @@ fn model_errors_are_what_a_random_walk_shows() {
                 (found.total - said.total).abs() < 5.0 * noise * (1.0 + said.total) + 1e-3,
                 "{model} {albedo}: {found:?} {said:?}"
             );
-            // Noise of the rings adds to the light that seems to be in the wrong place.
-            assert!((found.l1 - said.l1).abs() < 0.1, "{model} {albedo}: {found:?} {said:?}");
+            // The noise of a ring adds to the light that seems to be in the wrong place, at most all of it.
+            let rings = walked.rings.iter().zip(walked.radii.windows(2));
+            let rings: f64 = rings.map(|(ring, r)| ring.error * PI * (r[1] * r[1] - r[0] * r[0])).sum();
+            let allowed = 1.5 * rings / walked.total.mean + 5.0 * noise * (1.0 + said.l1) + 0.02;
+            assert!((found.l1 - said.l1).abs() < allowed, "{model} {albedo}: {found:?} {said:?}");
+            assert!(allowed < 0.5 + said.l1, "{model} {albedo}: the test has no force at {allowed}");
         }
     }
 }

@@ -10,7 +10,12 @@ use translucent::reference::profile::{
 use translucent::settings::Directional;
 use translucent::settings::Normalisation;
 use translucent::shared::MODEL_TABLE;
-use translucent::table::{cache, single::Matter as Single, store, walk::{Incidence, Walk}};
+use translucent::table::{
+    cache,
+    single::Matter as Single,
+    store,
+    walk::{Incidence, Walk},
+};
 
 const OPTIONS: Options = Options {
     normalisation: Normalisation::Energy,
