@@ -268,7 +268,7 @@ constants! {
     /// Beyond the edge a texture repeats in mirror images.
     WRAP_MIRROR: u32 = 2;
     /// Steps of a material's ramp, along which textures move its medium.
-    RAMP: u32 = 256;
+    RAMP: u32 = 512;
     /// GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
     MIRROR_ALPHA: f32 = 1e-6;
 

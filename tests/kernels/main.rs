@@ -16,6 +16,7 @@ mod sphere;
 mod stages;
 mod steps;
 mod sweep;
+mod textures;
 
 use bytemuck::Pod;
 use glam::UVec4;

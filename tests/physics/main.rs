@@ -15,4 +15,5 @@ mod rough;
 mod sphere;
 mod stages;
 mod table;
+mod texture;
 mod walk;
