@@ -97,7 +97,7 @@ const uint WRAP_CLAMP = 1u;
 // Beyond the edge a texture repeats in mirror images.
 const uint WRAP_MIRROR = 2u;
 // Steps of a material's ramp, along which textures move its medium.
-const uint RAMP = 256u;
+const uint RAMP = 512u;
 // GGX width below which a surface is a mirror: D, of the order 1 / alpha^2, would leave f32.
 const float MIRROR_ALPHA = 1e-6;
 // Dimension: radius.

@@ -331,7 +331,7 @@ fn materials(
         for c in 0..3 {
             if black.strength[c] == 0.0 {
                 texture::medium_fields().iter().for_each(|field| field(black)[c] = field(&mut next)[c]);
-                black.strength[c] = 0.0;
+                (black.strength[c], black.beam[c]) = (0.0, 0.0);
             }
         }
     }
@@ -463,7 +463,9 @@ fn material(
     };
     if material.tinted {
         // Light is tinted where it enters and where it leaves.
-        out.strength *= (material.base_color * material.base_color).as_vec3();
+        let tint = (material.base_color * material.base_color).as_vec3();
+        out.strength *= tint;
+        out.beam *= tint;
     }
     out.ior = material.ior as f32;
     out.alpha = alpha;

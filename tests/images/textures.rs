@@ -16,6 +16,7 @@ use translucent::{
         profile::{Dipole, Radial},
     },
     scene::Environment,
+    settings::Model,
 };
 
 fn data_uri(bytes: &[u8]) -> String {
@@ -178,7 +179,11 @@ fn slab(material: Value, at: DVec3, light: DVec3) -> Value {
 }
 
 fn mean_of(file: &Value, samples: u32) -> (f64, f64) {
-    let settings = Settings { resolution: Some((4, 4)), seed: 1, ..Settings::default() };
+    mean_by(Model::Standard, file, samples)
+}
+
+fn mean_by(model: Model, file: &Value, samples: u32) -> (f64, f64) {
+    let settings = Settings { resolution: Some((4, 4)), seed: 1, model, ..Settings::default() };
     let image = render(&scene(file), &settings, samples);
     let values: Vec<f64> = channel(&image, "subsurface.G").iter().map(|x| f64::from(*x)).collect();
     mean_and_error(&values)
@@ -211,6 +216,8 @@ fn base_colour_tints_both_crossings() {
     let mut factor = file.clone();
     factor["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([1, 0.5, 1, 1]);
     assert!((mean_of(&factor, 32).0 / plain - 0.25).abs() < 1e-5, "the same samples: the ratio is exact to rounding");
+    let directional = mean_by(Model::Directional, &factor, 32).0 / mean_by(Model::Directional, &file, 32).0;
+    assert!((directional - 0.25).abs() < 1e-5, "{directional}");
     let mut both = factor.clone();
     let texture = add_texture(&mut both, &RgbaImage::from_pixel(1, 1, Rgba([0, 188, 0, 255])), json!({}));
     both["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": texture});
