@@ -59,6 +59,7 @@ fn lookup_is_the_twins() {
         materials: &[],
         lights: &[],
         emitters: &[],
+        boundaries: &[],
         emitter_cdf: &[],
         environment: &[],
         environment_cdf: &[],
