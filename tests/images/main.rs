@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod edge_cases;
+mod emitters;
 mod fireflies;
 mod harness;
 mod inspect;
