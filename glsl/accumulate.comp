@@ -17,7 +17,6 @@ SHADINGS(readonly);
 SURFACES(readonly);
 PROBES(readonly);
 HIT_LISTS(readonly);
-BATCH_SUMS(read_write);
 
 // Weights of the second and third vertex at a point of a triangle, from its corner.
 vec2 weights(Triangle triangle, vec3 from_corner) {
@@ -46,23 +45,6 @@ vec3 directed(Material m, Seen s, vec3 delta, vec3 ni, vec3 wi, float shift) {
 float direction_density(View view, vec3 direction, float c) {
     if (ENVIRONMENT_KIND != ENVIRONMENT_IMAGE) return 1.0 / PI * c;
     return 0.5 * environment_density(view, direction) + 0.5 / PI * c;
-}
-
-// Adds to the sums of the pixel and, where they are kept, of the sample's batch.
-void add_subsurface(uint index, vec3 radiance) {
-    vec3 sum = running_sums[index].subsurface, carry = running_sums[index].subsurface_carry;
-    uint batch_index = step_.sample_index % BATCHES * step_.pixel_count + index;
-    vec3 batch_sum = vec3(0.0);
-    if (BATCHED != 0) batch_sum = batch_sums[batch_index];
-    // The batch's sum rounds otherwise, so that it may overflow alone.
-    if (!addable(radiance, sum) || !addable(radiance, batch_sum)) {
-        count_invalid(index);
-        return;
-    }
-    if (BATCHED != 0) batch_sums[batch_index] = batch_sum + radiance;
-    compensated_add(sum, carry, radiance);
-    running_sums[index].subsurface = sum;
-    running_sums[index].subsurface_carry = carry;
 }
 
 void main() {

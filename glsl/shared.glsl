@@ -12,6 +12,8 @@ const uint BATCHES = 8u;
 const uint STRATUM = 4u;
 // Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
 const uint MAX_HITS = 8u;
+// Most lights of one dispatch of `single`, which takes two rays to each and one more.
+const uint MAX_SINGLE = 2u;
 // Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
 const uint MAX_RAYS = 4u;
 // Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
@@ -124,6 +126,12 @@ const uint DIM_OVERFLOW = 11u;
 const uint DIM_EMITTER = 12u;
 // Dimensions 14 and 15: point of an emitter for the first surface (a point per direction).
 const uint DIM_EMITTER_REFLECT = 14u;
+// Dimensions 16 and 17: channel and depth of single scattering (`point` 0 and 1, scrambled otherwise).
+const uint DIM_SINGLE = 16u;
+// Dimensions 18 and 19: environment direction at that point (a point per direction).
+const uint DIM_SINGLE_LIGHT = 18u;
+// Dimensions 20 and 21: point of an emitter for that point (a point per direction).
+const uint DIM_SINGLE_EMITTER = 20u;
 
 // One of PROJECTION_*.
 layout(constant_id = 1) const uint PROJECTION = 0;
@@ -275,6 +283,12 @@ struct Material {
     float camera_rate;
     // Index of refraction, inside over outside.
     float ior;
+    // Extinction sigma_t, not reduced, for single scattering [1/length].
+    vec3 extinction;
+    // Scattering sigma_s, not reduced [1/length]; 0 where single scattering is not added.
+    vec3 scattering;
+    // Mean cosine of the phase function.
+    vec3 g;
     // GGX width alpha = roughness^2; 0 is a smooth mirror.
     float alpha;
     // Linear base colour of an opaque material.

@@ -1,6 +1,7 @@
 // The running sums of a pixel. What would make one of them infinite is left out and counted.
 
 RUNNING_SUMS(read_write);
+BATCH_SUMS(read_write);
 
 void count_sample(uint index, bool covered) {
     running_sums[index].samples++;
@@ -23,4 +24,21 @@ void compensated_add(inout vec3 sum, inout vec3 carry, vec3 x) {
 // Whether radiance is finite and not negative, and the sum with it finite.
 bool addable(vec3 radiance, vec3 sum) {
     return valid(radiance) && valid(sum + radiance);
+}
+
+// Adds light that passed through matter to the sums of the pixel and, where they are kept, of the sample's batch.
+void add_subsurface(uint index, vec3 radiance) {
+    vec3 sum = running_sums[index].subsurface, carry = running_sums[index].subsurface_carry;
+    uint batch_index = step_.sample_index % BATCHES * step_.pixel_count + index;
+    vec3 batch_sum = vec3(0.0);
+    if (BATCHED != 0) batch_sum = batch_sums[batch_index];
+    // The batch's sum rounds otherwise, so that it may overflow alone.
+    if (!addable(radiance, sum) || !addable(radiance, batch_sum)) {
+        count_invalid(index);
+        return;
+    }
+    if (BATCHED != 0) batch_sums[batch_index] = batch_sum + radiance;
+    compensated_add(sum, carry, radiance);
+    running_sums[index].subsurface = sum;
+    running_sums[index].subsurface_carry = carry;
 }

@@ -48,6 +48,8 @@ pub struct MatterReport {
     pub recommended: Choice,
     /// Error of the model on a plane, in the channel where it is largest.
     pub error: Option<model::errors::Error>,
+    /// Whether light that was scattered once is added to the model's.
+    pub single_scattering: bool,
     /// [1/mm].
     pub sigma_s_prime: DVec3,
     /// [1/mm].
@@ -64,7 +66,7 @@ pub struct MatterReport {
 }
 
 impl MatterReport {
-    fn new(medium: &Medium, ior: f64, advice: &Advice) -> MatterReport {
+    fn new(medium: &Medium, ior: f64, settings: &Settings, advice: &Advice) -> MatterReport {
         let (sigma_s_prime, sigma_a) = (medium.sigma_s_prime * 1e-3, medium.sigma_a * 1e-3);
         let extinction = sigma_s_prime + sigma_a;
         let choice = advice.choice.clone();
@@ -78,6 +80,7 @@ impl MatterReport {
             why: choice.why,
             recommended: advice.recommended.clone(),
             error: advice.error,
+            single_scattering: model::adds_single_scattering(settings, medium, choice.model),
             sigma_s_prime,
             sigma_a,
             g: medium.g,
@@ -106,7 +109,7 @@ impl<'a> Inspection<'a> {
                 .medium
                 .as_ref()
                 .zip(plan.prepared.advice[index].as_ref())
-                .map(|(medium, advice)| MatterReport::new(medium, material.ior, advice)),
+                .map(|(medium, advice)| MatterReport::new(medium, material.ior, settings, advice)),
         };
         let materials = scene.materials.iter().enumerate().map(report).collect();
         let warnings = scene.warnings.iter().cloned().chain(plan.prepared.warnings()).collect();
@@ -185,6 +188,7 @@ fn material(report: &MaterialReport) -> Value {
             "why": matter.why,
             "recommended": {"model": matter.recommended.model.to_string(), "why": matter.recommended.why},
             "error": matter.error.map(|error| json!({"total": error.total, "l1": error.l1})),
+            "singleScattering": matter.single_scattering,
             "sigmaSPrimePerMm": matter.sigma_s_prime.to_array(),
             "sigmaAPerMm": matter.sigma_a.to_array(),
             "g": matter.g.to_array(),

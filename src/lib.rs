@@ -90,4 +90,4 @@ pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use image::Image;
 pub use render::{Progress, Renderer};
 pub use scene::{Environment, LoadOptions, Scene};
-pub use settings::{CameraChoice, Model, Normalisation, Projection, Settings};
+pub use settings::{CameraChoice, Model, Normalisation, Projection, Settings, SingleScattering};

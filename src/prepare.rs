@@ -7,6 +7,7 @@ use crate::{
         Inputs, emitter, light,
         profile::{self, Coefficients, Dipole, Radial},
         rough::Boundaries,
+        single::Scattering,
         texture,
     },
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap, curvature::curvatures},
@@ -43,6 +44,8 @@ pub struct Prepared {
     pub rows: std::ops::Range<u32>,
     /// Whether any material scatters light: otherwise the three kernels do not run.
     pub has_translucent: bool,
+    /// Whether light that was scattered once is added to a material's.
+    pub has_single: bool,
     /// Whether light can leave a first surface without having entered it, or the environment is shown: otherwise
     /// `reflect` does not run.
     pub has_reflection: bool,
@@ -198,6 +201,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     Ok(Prepared {
         features,
         view,
+        has_single: materials.iter().any(|material| material.scattering != Vec3::ZERO),
         materials,
         has_translucent: used(true),
         has_reflection: used(false)
@@ -451,6 +455,13 @@ fn material(
             };
             out.radius_max = out.radius_max.min(SET_DIAMETER);
             out.boundary = rough.map_or(0, |(table, _)| table);
+            if model::adds_single_scattering(settings, medium, model) {
+                let vector = |value: fn(&Coefficients) -> f64| glam::DVec3::from(coefficients.each_ref().map(value));
+                let scattering = Scattering::new(vector(|c| c.sigma_s_prime), vector(|c| c.sigma_a), vector(|c| c.g));
+                out.extinction = scattering.extinction.as_vec3();
+                out.scattering = scattering.scattering.as_vec3();
+                out.g = scattering.g.as_vec3();
+            }
             if settings.projection == Projection::Camera && out.component_cdf[8] > 0.0 && out.camera_rate <= 0.0 {
                 let problem = format!(
                     "camera needs sigma_tr > 0 in every channel, but material \"{}\" ({}) absorbs nothing in one; use mis or normal",

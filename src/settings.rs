@@ -93,6 +93,40 @@ impl Default for Directional {
     }
 }
 
+/// Whether light that was scattered once is added to a model that leaves it out; see `reference::single`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SingleScattering {
+    /// What the material's file says, else where it makes the error of the total smaller; see
+    /// [`model::adds_single_scattering`](crate::model::adds_single_scattering).
+    #[default]
+    Auto,
+    /// To the standard and the better dipole: the other models hold it already.
+    On,
+    Off,
+}
+
+impl SingleScattering {
+    /// Every choice, with its name in files and on the command line.
+    pub const NAMES: [(SingleScattering, &str); 3] =
+        [(SingleScattering::Auto, "auto"), (SingleScattering::On, "on"), (SingleScattering::Off, "off")];
+}
+
+impl fmt::Display for SingleScattering {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (_, name) = SingleScattering::NAMES.iter().find(|(it, _)| it == self).expect("every choice has a name");
+        out.pad(name)
+    }
+}
+
+impl FromStr for SingleScattering {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<SingleScattering, String> {
+        let found = SingleScattering::NAMES.iter().find(|(_, name)| *name == text);
+        found.map(|(choice, _)| *choice).ok_or_else(|| format!("must be auto, on or off, is \"{text}\""))
+    }
+}
+
 /// Which camera of the scene looks.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub enum CameraChoice {
@@ -122,6 +156,8 @@ pub struct Settings {
     pub directional: Directional,
     /// Lets the table model follow how thick the body is at each point; without, every body is a half-space to it.
     pub curvature: bool,
+    /// Single scattering of every translucent material; `Auto` leaves it to each.
+    pub single_scattering: SingleScattering,
     /// Key of all random numbers.
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
@@ -151,6 +187,7 @@ impl Default for Settings {
             model: Model::Auto,
             directional: Directional::default(),
             curvature: true,
+            single_scattering: SingleScattering::Auto,
             seed: 0,
             show_environment: false,
             variance: true,

@@ -176,6 +176,8 @@ constants! {
     STRATUM: u32 = 4;
     /// Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
     MAX_HITS: u32 = 8;
+    /// Most lights of one dispatch of `single`, which takes two rays to each and one more.
+    MAX_SINGLE: u32 = 2;
     /// Most shadow rays of one dispatch of `accumulate` or `reflect`, far below Mesa 22's cap of 65,535 loop trips.
     MAX_RAYS: u32 = 4;
     /// Distance along the geometric normal from a surface to the origin of its shadow rays [internal units]: some 30
@@ -296,6 +298,12 @@ constants! {
     DIM_EMITTER: u32 = 12;
     /// Dimensions 14 and 15: point of an emitter for the first surface (a point per direction).
     DIM_EMITTER_REFLECT: u32 = 14;
+    /// Dimensions 16 and 17: channel and depth of single scattering (`point` 0 and 1, scrambled otherwise).
+    DIM_SINGLE: u32 = 16;
+    /// Dimensions 18 and 19: environment direction at that point (a point per direction).
+    DIM_SINGLE_LIGHT: u32 = 18;
+    /// Dimensions 20 and 21: point of an emitter for that point (a point per direction).
+    DIM_SINGLE_EMITTER: u32 = 20;
 }
 
 structs! {
@@ -430,6 +438,12 @@ structs! {
         camera_rate: f32,
         /// Index of refraction, inside over outside.
         ior: f32,
+        /// Extinction sigma_t, not reduced, for single scattering [1/length].
+        extinction: Vec3,
+        /// Scattering sigma_s, not reduced [1/length]; 0 where single scattering is not added.
+        scattering: Vec3,
+        /// Mean cosine of the phase function.
+        g: Vec3,
         /// GGX width alpha = roughness^2; 0 is a smooth mirror.
         alpha: f32,
         /// Linear base colour of an opaque material.

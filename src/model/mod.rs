@@ -19,7 +19,7 @@ use crate::reference::boundary::{Side, diffuse_reflectance};
 use crate::reference::math::integrate;
 use crate::reference::profile::{self, Coefficients, Dipole, Directional, Profile, Radial};
 use crate::scene::{Material, Medium};
-use crate::settings::{Model, Settings};
+use crate::settings::{Model, Settings, SingleScattering};
 use errors::Error;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -171,4 +171,27 @@ pub fn beam(model: Model, matter: &Coefficients) -> Option<Box<dyn Fn(f64) -> f6
     }
     let profile = Profile::new(constant, matter);
     Some(Box::new(move |r: f64| if r.is_finite() { profile.cdf(r) } else { profile.total() }))
+}
+
+/// Reduced albedo from which on single scattering makes the better dipole's total worse. Its total on a half-space is too
+/// dark by the light that was scattered once, but it errs to the bright side in what was scattered more: without and with
+/// the term, errors of the total are -39 % and +5 % at alpha' = .68, -24 and +6 at .84, -8 and +9 at .96 (n = 1.3), and
+/// -1 and +6 above .99 (n = 1.5), by a Monte Carlo simulation.
+const SINGLE_ALBEDO_MAX: f64 = 0.95;
+
+/// Whether light that was scattered once is added to the light of a model: where the settings, else the file ask for it,
+/// else to the better dipole if a channel that scatters has a reduced albedo below .95. The standard dipole's total is that of all light, though
+/// it has little at short distances; directional dipole, normalised diffusion and tables hold it.
+pub fn adds_single_scattering(settings: &Settings, medium: &Medium, model: Model) -> bool {
+    let asked = match settings.single_scattering {
+        SingleScattering::Auto => medium.single_scattering,
+        asked => asked,
+    };
+    let albedo = |c: usize| medium.sigma_s_prime[c] / (medium.sigma_s_prime[c] + medium.sigma_a[c]);
+    let absorbs = || (0..3).any(|c| medium.sigma_s_prime[c] > 0.0 && albedo(c) < SINGLE_ALBEDO_MAX);
+    match (model, asked) {
+        (Model::Standard | Model::Better, SingleScattering::On) => true,
+        (Model::Better, SingleScattering::Auto) => absorbs(),
+        _ => false,
+    }
 }

@@ -106,7 +106,8 @@ fn materials(inspection: &Inspection) -> String {
             None => text.push_str(", opaque\n"),
             Some(matter) => {
                 let _ = writeln!(text, ", {}", matter.source);
-                let _ = writeln!(text, "    model {}: {}", matter.model, matter.why);
+                let single = if matter.single_scattering { " + single scattering" } else { "" };
+                let _ = writeln!(text, "    model {}{single}: {}", matter.model, matter.why);
                 if let Some(error) = matter.error {
                     let _ = writeln!(text, "    a plane {error}");
                 }

@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use translucent::{
-    CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings,
+    CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
     settings::Directional,
 };
@@ -43,6 +43,10 @@ pub struct SceneOptions {
     /// Regularisation of the directional dipole near its source; 0 is the published model, with its fireflies.
     #[arg(long, value_name = "K", default_value_t = 1.0, allow_negative_numbers = true, value_parser = arguments::not_negative)]
     kappa: f64,
+    /// Light that was scattered once, added to the standard or the better dipole: on, off, or auto, which is what the
+    /// material says, else to a better dipole of matter with an albedo below .95.
+    #[arg(long, value_name = "auto|on|off", default_value = "auto", value_parser = single_scattering())]
+    single_scattering: SingleScattering,
     /// Light from infinitely far away: a latitude-longitude image or one radiance.
     #[arg(long, value_name = "FILE.hdr|.exr|constant:R,G,B", value_parser = arguments::environment)]
     environment: Option<EnvironmentSource>,
@@ -98,6 +102,11 @@ fn albedo_mappings() -> impl TypedValueParser<Value = AlbedoMapping> {
     })
 }
 
+fn single_scattering() -> impl TypedValueParser<Value = SingleScattering> {
+    PossibleValuesParser::new(SingleScattering::NAMES.map(|(_, name)| name))
+        .map(|name| name.parse().expect("the parser passes names alone"))
+}
+
 impl SceneOptions {
     /// The scene with its environment, and what a user should know about it.
     pub fn load(&self) -> translucent::Result<(Scene, Vec<String>)> {
@@ -146,6 +155,7 @@ impl SceneOptions {
             normalisation: self.normalisation,
             model: self.model,
             directional: Directional { renormalise: self.renormalise, reciprocal: self.reciprocal, kappa: self.kappa },
+            single_scattering: self.single_scattering,
             show_environment: self.show_environment,
             ..Settings::default()
         }

@@ -111,7 +111,7 @@ pub fn accumulate(
 }
 
 /// The base colour's texture, which tints what crosses the surface; the factor is in the profile's strength.
-fn tint(inputs: &Inputs, triangle: u32, barycentric: DVec2) -> DVec3 {
+pub(super) fn tint(inputs: &Inputs, triangle: u32, barycentric: DVec2) -> DVec3 {
     texture::value(inputs, TEXTURE_BASE_COLOR, triangle, barycentric).truncate()
 }
 

@@ -21,6 +21,7 @@ pub mod reproject;
 pub mod resolve;
 pub mod rough;
 pub mod sample;
+pub mod single;
 pub mod sums;
 pub mod texture;
 pub mod walk;
@@ -104,6 +105,8 @@ fn render_pixel(inputs: &Inputs, index: u32, rows: Range<u32>, samples: Range<u3
         subsurface.add_subsurface(&step, &surface, &mut sums, &mut batch_sums[batch]);
         let reflection = reflect::reflect(inputs, &step, index, &surface);
         reflection.add_reflection(&mut sums);
+        let once = single::single(inputs, &step, index, &surface);
+        once.add_single(&mut sums, &mut batch_sums[batch]);
     }
     let step = step(inputs, samples.start, rows, samples);
     resolve::resolve(&inputs.features, &step, &sums, &batch_sums)

@@ -25,6 +25,15 @@ impl Contribution {
     /// Adds to the sums of a pixel as `accumulate.comp` does. `batch_sum` is the one of the sample's batch; where the
     /// kernel keeps none, a caller's to forget.
     pub fn add_subsurface(&self, step: &Step, surface: &Surface, sums: &mut Sums, batch_sum: &mut Vec3) {
+        self.add_single(sums, batch_sum);
+        if step.count != 0 {
+            sums.samples += 1;
+            sums.covered += u32::from(surface.triangle != MISS);
+        }
+    }
+
+    /// Adds to the sums of a pixel as `single.comp` does.
+    pub fn add_single(&self, sums: &mut Sums, batch_sum: &mut Vec3) {
         let radiance = self.radiance.as_vec3();
         let fits = !self.invalid && (sums.subsurface + radiance).is_finite() && (*batch_sum + radiance).is_finite();
         if fits {
@@ -32,10 +41,6 @@ impl Contribution {
             *batch_sum += radiance;
         }
         sums.invalid += u32::from(!fits);
-        if step.count != 0 {
-            sums.samples += 1;
-            sums.covered += u32::from(surface.triangle != MISS);
-        }
     }
 
     /// Adds to the sums of a pixel as `reflect.comp` does.

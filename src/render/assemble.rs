@@ -182,6 +182,7 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         "reciprocal": settings.directional.reciprocal,
         "kappa": settings.directional.kappa,
         "curvature": settings.curvature,
+        "singleScattering": settings.single_scattering.to_string(),
         "radiusTail": settings.radius_tail,
         "showEnvironment": settings.show_environment,
     });

@@ -14,7 +14,7 @@ use crate::{
     reference::random,
     scene::{Frame, Scene},
     settings::Settings,
-    shared::{BATCHES, MAX_RAYS, STRATUM, Slot, Step},
+    shared::{BATCHES, MAX_RAYS, MAX_SINGLE, STRATUM, Slot, Step},
 };
 use bands::{Band, Film};
 use std::ops::{ControlFlow, Range};
@@ -57,7 +57,7 @@ macro_rules! kernels {
             &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
     };
 }
-kernels!(primary, sample, reproject, accumulate, reflect, resolve);
+kernels!(primary, sample, reproject, accumulate, reflect, single, resolve);
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -321,6 +321,11 @@ impl Renderer {
                 }
             }
             step.first = 0;
+        }
+        for begin in (0..prepared.ray_count).step_by(MAX_SINGLE as usize) {
+            step.ray_begin = begin;
+            step.ray_count = (prepared.ray_count - begin).min(MAX_SINGLE);
+            dispatch(&kernels.single, &step);
         }
         Ok(())
     }

@@ -108,6 +108,10 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
             true => (true, "a surface is translucent"),
             false => (false, "no surface is translucent"),
         },
+        "single" => match prepared.has_single && prepared.ray_count > 0 {
+            true => (true, "a model leaves out light that was scattered once"),
+            false => (false, "no model needs light that was scattered once, or there is no light"),
+        },
         "reflect" => match prepared.has_reflection {
             true => (true, "light can leave a first surface that it did not enter, or the environment is shown"),
             false => (false, "no light can leave a first surface that it did not enter: delta lights on smooth matter"),

@@ -43,6 +43,7 @@ pub(super) fn hash(scene: &Scene) -> String {
             feed.numbers(medium.sigma_a.to_array());
             feed.numbers(medium.g.to_array());
             feed.count(medium.model.map_or(0, |model| 1 + model as usize));
+            feed.count(medium.single_scattering as usize);
             if let Some(appearance) = &medium.appearance {
                 feed.numbers(appearance.albedo.to_array());
                 feed.numbers(appearance.length.to_array());

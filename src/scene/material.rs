@@ -12,7 +12,10 @@ use crate::shared::{
     RAMP, TEXTURE_ALPHA, TEXTURE_BASE_COLOR, TEXTURE_EMISSION, TEXTURE_METALLIC_ROUGHNESS, TEXTURE_NORMAL,
     TEXTURE_SCATTER_COLOR, TEXTURE_SCATTER_STRENGTH,
 };
-use crate::{Error, Result, settings::Model};
+use crate::{
+    Error, Result,
+    settings::{Model, SingleScattering},
+};
 use glam::DVec3;
 use std::path::Path;
 
@@ -40,6 +43,7 @@ const BSSRDF_KEYS: &[&str] = &[
     "ior",
     "g",
     "model",
+    "single_scattering",
     "surface",
     "set",
 ];
@@ -286,6 +290,7 @@ fn medium_of(preset: &Preset) -> Medium {
         g: preset.g,
         appearance: None,
         model: None,
+        single_scattering: SingleScattering::Auto,
         source: format!("preset {}", preset.name),
     }
 }
@@ -336,8 +341,10 @@ fn read_bssrdf(item: &Item, authored_ior: Option<f64>, material: &mut Material) 
         } else {
             return Err(item.error("needs `preset`, or `sigma_a` with `sigma_s_prime`, or `albedo` with a length"));
         };
+        let source = "extras.bssrdf".into();
+        let single_scattering = SingleScattering::Auto;
         material.medium =
-            Some(Medium { sigma_s_prime, sigma_a, g, appearance, model: None, source: "extras.bssrdf".into() });
+            Some(Medium { sigma_s_prime, sigma_a, g, appearance, model: None, single_scattering, source });
     }
 
     if let Some(model) = item.get("model")? {
@@ -345,6 +352,12 @@ fn read_bssrdf(item: &Item, authored_ior: Option<f64>, material: &mut Material) 
             super::json::shorten(model.string()?).parse().map_err(|problem: String| model.error(problem))?;
         if let Some(medium) = &mut material.medium {
             medium.model = Some(chosen);
+        }
+    }
+    if let Some(single) = item.get("single_scattering")? {
+        let chosen = super::json::shorten(single.string()?).parse().map_err(|problem: String| single.error(problem))?;
+        if let Some(medium) = &mut material.medium {
+            medium.single_scattering = chosen;
         }
     }
     if let Some(surface) = item.get("surface")? {

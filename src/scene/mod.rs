@@ -24,7 +24,11 @@ mod unit;
 pub use presets::{Preset, preset, presets};
 pub use unit::parse_unit;
 
-use crate::{Error, Result, settings::Model, shared};
+use crate::{
+    Error, Result,
+    settings::{Model, SingleScattering},
+    shared,
+};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
@@ -295,6 +299,8 @@ pub struct Medium {
     pub appearance: Option<Appearance>,
     /// The profile that the file names.
     pub model: Option<Model>,
+    /// What the file says about light scattered once.
+    pub single_scattering: SingleScattering,
     /// Where the numbers came from: "preset skin1", "extras.bssrdf", "KHR_materials_scatter", ...
     pub source: String,
 }

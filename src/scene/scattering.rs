@@ -4,7 +4,7 @@ use super::json::Item;
 use super::material::{LENGTH_RANGE, read_g};
 use super::medium::Mapping;
 use super::{AlbedoMapping, Medium};
-use crate::Result;
+use crate::{Result, settings::SingleScattering};
 use glam::DVec3;
 
 /// Stands for an attenuation colour of 0, which would be an infinite extinction.
@@ -75,7 +75,15 @@ impl Authored {
             Mapping::Scatter => "KHR_materials_scatter",
             Mapping::VolumeScatter => "KHR_materials_volume_scatter",
         };
-        Medium { sigma_s_prime, sigma_a, g: self.g, appearance: None, model: None, source: source.into() }
+        Medium {
+            sigma_s_prime,
+            sigma_a,
+            g: self.g,
+            appearance: None,
+            model: None,
+            single_scattering: SingleScattering::Auto,
+            source: source.into(),
+        }
     }
 }
 

@@ -29,6 +29,7 @@ void main() {
     if (step_.ray_begin == 2) y.x = log1p_(x.x);
     if (step_.ray_begin == 3) y = cos_sin_2pi(x.x);
     if (step_.ray_begin == 4) y.x = atan2_(x.y, x.x);
+    if (step_.ray_begin == 5) y.x = one_minus_exp_over(x.x);
     batch_sums[i] = vec3(y, 0.0);
 }
 "#;
@@ -107,6 +108,12 @@ fn exponential() {
     // Beyond the range: nothing, or infinity; never less than nothing, never not a number.
     let far = evaluate(0, &arguments([-1e30, -88.0, -87.1, 89.0, 1e30].into_iter()));
     assert_eq!(far.iter().map(|y| y.x).collect::<Vec<_>>(), [0.0, 0.0, 0.0, f32::INFINITY, f32::INFINITY]);
+}
+
+#[test]
+fn one_minus_exponential() {
+    let x = arguments(numbers(8).map(|u| 10f64.powf(32.0 * u - 30.0)).chain(numbers(9)).chain([1e30]));
+    assert_relative("(1 - exp(-x)) / x", &x, &evaluate(5, &x), |x| -f64::exp_m1(-x) / x);
 }
 
 #[test]

@@ -5,13 +5,14 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 use translucent::{
-    Model, Projection, Scene, Settings,
+    Model, Projection, Scene, Settings, SingleScattering,
     reference::{
         self, Inputs, accumulate::accumulate, primary::primary, reflect::reflect, reproject::reproject, sample::sample,
+        single::single,
     },
     scene::{Environment, EnvironmentMap, LightKind},
     settings::Directional,
-    shared::{BATCHES, Hits, MISS, Pixel, Probe, Slot, Step, Sums, Surface},
+    shared::{BATCHES, Hits, MISS, PROJECTION_MIS, Pixel, Probe, Slot, Step, Sums, Surface},
 };
 
 /// The full image, and the part of it that is tested: what the animal fills.
@@ -30,6 +31,9 @@ fn cases() -> Vec<(String, Case)> {
         if let LightKind::Spot { inner, outer } = &mut light.kind {
             (*inner, *outer) = (0.3, 0.6);
         }
+    }
+    for medium in demo.materials.iter_mut().filter_map(|material| material.medium.as_mut()) {
+        medium.g = DVec3::new(0.0, 0.7, -0.8);
     }
     let constant = Environment::constant(DVec3::new(0.5, 0.7, 1.0)).expect("valid");
     let texel = |i: u32| Vec3::new(0.1 + (i % 7) as f32, 0.2 + (i % 5) as f32, 0.3 + (i % 11) as f32);
@@ -52,7 +56,13 @@ fn cases() -> Vec<(String, Case)> {
         if let Some(environment) = environment {
             scene.set_environment(environment.clone()).expect("the environment is valid");
         }
-        let settings = Settings { resolution: Some(FULL), crop: Some(CROP), seed: 3, ..Settings::default() };
+        let settings = Settings {
+            resolution: Some(FULL),
+            crop: Some(CROP),
+            seed: 3,
+            single_scattering: SingleScattering::On,
+            ..Settings::default()
+        };
         cases.push((format!("emitters, {}", scene.lights.len()), Case::new(scene, &settings)));
     }
     for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
@@ -69,6 +79,7 @@ fn cases() -> Vec<(String, Case)> {
                 directions: 2,
                 seed: 3,
                 show_environment: true,
+                single_scattering: SingleScattering::On,
                 ..Settings::default()
             };
             cases.push((format!("{projection:?}, {name}"), Case::new(scene, &settings)));
@@ -280,6 +291,38 @@ fn accumulate_adds_the_twins_radiance() {
     });
     assert!(errors.len() > 3000, "{} lit samples", errors.len());
     assert_close("accumulate", &errors);
+}
+
+#[test]
+fn single_adds_the_twins_radiance() {
+    let mut errors = vec![];
+    for_each_case(|name, case, stages| {
+        // No projection has a say.
+        if case.inputs().features.projection != PROJECTION_MIS {
+            return;
+        }
+        let (sums, batch) = run_sums(case, "single", stages);
+        let inputs = case.inputs();
+        let twins: Vec<_> = (0..sums.len())
+            .into_par_iter()
+            .map(|i| single(&inputs, &stages.step, i as u32, &stages.surfaces[i]))
+            .collect();
+        for (index, (sums, twin)) in sums.iter().zip(&twins).enumerate() {
+            assert_eq!((sums.samples, sums.invalid), (0, u32::from(twin.invalid)), "{name}");
+            assert_eq!(batch[index], sums.subsurface, "{name}");
+            if twin.radiance == DVec3::ZERO && sums.subsurface == Vec3::ZERO {
+                continue;
+            }
+            // A length of matter is known to two roundings of a position.
+            let material =
+                &inputs.materials[inputs.shadings[stages.surfaces[index].triangle as usize].material as usize];
+            let rounding = f64::from(material.extinction.max_element()) * 2f64.powi(-23);
+            let error = (sums.subsurface.as_dvec3() - twin.radiance).length() / twin.radiance.length();
+            errors.push(error / (1.0 + 1e5 * rounding));
+        }
+    });
+    assert!(errors.len() > 1000, "{} lit samples", errors.len());
+    assert_close("single", &errors);
 }
 
 #[test]

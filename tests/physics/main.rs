@@ -12,6 +12,7 @@ mod plane;
 mod profile;
 mod random;
 mod rough;
+mod single;
 mod sphere;
 mod stages;
 mod table;

@@ -109,6 +109,7 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
             "--samples",
             "--seed",
             "--show-environment",
+            "--single-scattering",
             "--unit",
         ]
     );
