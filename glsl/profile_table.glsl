@@ -3,11 +3,12 @@
 PROFILES(readonly);
 THICKNESS(readonly);
 
-// The curvatures of the table around that of the surface that is seen: the first of two, its weight, and the squared
-// factors on distances. Without curvatures there is the half-space alone.
+// The curvatures of the table around that of the surface that is seen: the first of two, its weight, how distances bend
+// for both, and 1/4a^2. Without curvatures there is the half-space alone.
 uint table_node = 0u;
 float table_weight = 1.0;
-vec2 table_stretch2 = vec2(1.0);
+vec2 table_bend = vec2(0.0);
+float table_scale = 0.0;
 
 uint table_base(Material m, uint node) {
     return m.table + node * (TABLE_HEADER + 6u * (m.table_cells + 1u));
@@ -20,19 +21,30 @@ void table_at(Material m, Surface surface) {
     if (CURVATURE == 0) return;
     vec2 b = surface.barycentric;
     float curvature = dot(thickness[surface.triangle], vec3(1.0 - b.x - b.y, b));
+    table_scale = 0.25 * curvature * curvature;
     uint above = 0u;
     while (above < min(m.table_nodes, TABLE_NODES) && profiles[table_base(m, above)] > curvature) above++;
     if (above == m.table_nodes) return;
     float low = profiles[table_base(m, above)];
     if (above == 0u) {
         table_node = 0u;
-        if (low > 0.0 && curvature > 0.0) table_stretch2 = vec2(curvature * curvature / (low * low));
+        if (low > 0.0) table_bend = vec2(low / curvature - 1.0);
         return;
     }
     float high = profiles[table_base(m, above - 1u)];
     table_node = above - 1u;
     table_weight = (curvature - low) / (high - low);
-    if (low > 0.0) table_stretch2 = curvature * curvature / vec2(high * high, low * low);
+    if (low > 0.0) table_bend = vec2(high, low) / curvature - 1.0;
+}
+
+// Squared distance in a table of another diameter, and the factor on areas there; nothing lies beyond the diameter.
+float table_bent(float r2, float bend, out float area) {
+    area = 1.0;
+    if (CURVATURE == 0 || bend == 0.0) return r2;
+    float q = r2 * table_scale;
+    float d = 1.0 + bend * q;
+    area = q <= 1.0 ? (1.0 - bend * q) / (d * d * d) : 0.0;
+    return q <= 1.0 ? r2 / (d * d) : 0.0;
 }
 
 // The channels' values at one curvature.
@@ -63,9 +75,12 @@ vec3 table_vector(Material m, uint node, uint at) {
 }
 
 vec3 table_shape(Material m, float r2, float shift) {
-    vec3 f = table_weight * table_stretch2.x * table_value(m, table_node, r2 * table_stretch2.x);
+    float area;
+    float bent = table_bent(r2, table_bend.x, area);
+    vec3 f = table_weight * area * table_value(m, table_node, bent);
     if (CURVATURE != 0 && table_weight < 1.0) {
-        f += (1.0 - table_weight) * table_stretch2.y * table_value(m, table_node + 1u, r2 * table_stretch2.y);
+        bent = table_bent(r2, table_bend.y, area);
+        f += (1.0 - table_weight) * area * table_value(m, table_node + 1u, bent);
     }
     if (shift == 0.0) return f;
     // One exponential: the value may be as small as the other factor is large.
@@ -76,13 +91,20 @@ vec3 table_shape(Material m, float r2, float shift) {
 // Density of the radius per area of the plane. The half-space's mass is 1.
 float table_density(Material m, float r2) {
     if (CURVATURE == 0) return dot(m.density, table_value(m, table_node, r2));
-    vec3 p = table_weight * table_stretch2.x * table_value(m, table_node, r2 * table_stretch2.x)
-        * table_vector(m, table_node, 2u);
+    float area;
+    float bent = table_bent(r2, table_bend.x, area);
+    vec3 p = table_weight * area * table_value(m, table_node, bent) * table_vector(m, table_node, 2u);
     if (table_weight < 1.0) {
-        p += (1.0 - table_weight) * table_stretch2.y * table_value(m, table_node + 1u, r2 * table_stretch2.y)
-            * table_vector(m, table_node + 1u, 2u);
+        bent = table_bent(r2, table_bend.y, area);
+        p += (1.0 - table_weight) * area * table_value(m, table_node + 1u, bent) * table_vector(m, table_node + 1u, 2u);
     }
     return dot(m.density, p);
+}
+
+// The distance that is bent to a squared distance.
+float table_unbent(float s, float bend) {
+    if (CURVATURE == 0 || bend == 0.0) return sqrt(s);
+    return 2.0 * sqrt(s) / (1.0 + sqrt(max(1.0 - 4.0 * bend * table_scale * s, 0.0)));
 }
 
 // Radius with that density.
@@ -97,9 +119,9 @@ float table_radius(Material m, float u_component, float u) {
     uint within = values + nodes;
     uint low = 0u, high = uint(profiles[base + 1u]);
     float target = u * profiles[within + high];
-    float stretch2 = second ? table_stretch2.y : table_stretch2.x;
+    float bend = second ? table_bend.y : table_bend.x;
     if (target < profiles[within]) {
-        return sqrt(uintBitsToFloat(m.table_first << TABLE_SHIFT) * (target / profiles[within]) / stretch2);
+        return table_unbent(uintBitsToFloat(m.table_first << TABLE_SHIFT) * (target / profiles[within]), bend);
     }
     for (uint k = 0u; k < TABLE_HALVINGS && high - low > 1u; k++) {
         uint middle = (low + high) / 2u;
@@ -112,7 +134,7 @@ float table_radius(Material m, float u_component, float u) {
     float q = (target - profiles[within + low]) / (PI * width);
     float root = a + sqrt(max(a * a + 2.0 * (b - a) * q, 0.0));
     float t = root > 0.0 ? min(2.0 * q / root, 1.0) : 0.0;
-    return sqrt((s0 + t * width) / stretch2);
+    return table_unbent(s0 + t * width, bend);
 }
 
 // Factor on light that enters, or leaves, at the cosine outside.

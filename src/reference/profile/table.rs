@@ -3,9 +3,10 @@
 //! A table holds values at the nodes of r^2 and the light within them, for spheres of several radii and the half-space;
 //! see [`crate::table::block`]. Between two radii a1 < a < a2 of spheres
 //!
-//!   f(r) = sum of w_k c_k^2 f_k(c_k r),  w linear in 1/a,  c_k = a_k / a,
+//!   f(r) = sum of w_k (1 - h_k q) / (1 + h_k q)^3 f_k(r / (1 + h_k q)),  w linear in 1/a,  h_k = a / a_k - 1,  q = (r / 2 a)^2,
 //!
-//! so that each part ends at the diameter 2 a and keeps its total; c_k = 1 where the half-space is one of the two.
+//! so that each part keeps its values near the entry, its total, and ends at the diameter 2 a; h_k = 0 where the
+//! half-space is one of the two.
 //! Drawn is a channel, one of the two with the probability w_k, and r^2 from its distribution function.
 //!
 //! # Oblique light
@@ -125,51 +126,85 @@ impl<'a> Node<'a> {
     }
 }
 
-/// The nodes around the matter's curvature with their weights w and factors c on distances.
-fn nodes(matter: Matter) -> Vec<(usize, f64, f64)> {
+/// A node around the matter's curvature: its index, its weight, and how distances bend, h = 1/c - 1.
+struct Part {
+    node: usize,
+    weight: f64,
+    bend: f64,
+    /// 1 / 4 a^2.
+    scale: f64,
+}
+
+impl Part {
+    /// Squared distance in the node's table, and the factor on areas there; nothing lies beyond the diameter.
+    fn bent(&self, r: f64) -> (f64, f64) {
+        let s = r * r;
+        if self.bend == 0.0 {
+            return (s, 1.0);
+        }
+        let q = s * self.scale;
+        let d = 1.0 + self.bend * q;
+        if q <= 1.0 { (s / (d * d), (1.0 - self.bend * q) / d.powi(3)) } else { (0.0, 0.0) }
+    }
+
+    /// The distance that is bent to the squared distance s.
+    fn unbent(&self, s: f64) -> f64 {
+        2.0 * s.sqrt() / (1.0 + (1.0 - 4.0 * self.bend * self.scale * s).max(0.0).sqrt())
+    }
+
+    /// Values of the channels at the distance r, weighted.
+    fn values(&self, matter: Matter, r: f64) -> DVec3 {
+        let (s, area) = self.bent(r);
+        self.weight * area * Node::of(matter, self.node).values(s)
+    }
+}
+
+fn parts(matter: Matter) -> Vec<Part> {
     let curvature = matter.curvature;
     let count = matter.material.table_nodes as usize;
     let of = |k: usize| Node::of(matter, k).curvature();
-    let stretch =
-        |k: usize, other: f64| if other > 0.0 && of(k) > 0.0 && curvature > 0.0 { curvature / of(k) } else { 1.0 };
+    let scale = 0.25 * curvature * curvature;
     // Curvatures fall from node to node.
     let above = (0..count).take_while(|&k| of(k) > curvature).count();
     if above == count {
-        return vec![(count - 1, 1.0, 1.0)];
+        return vec![Part { node: count - 1, weight: 1.0, bend: 0.0, scale }];
     }
+    // Distances bend where both are spheres.
+    let low = of(above);
+    let bend = |k: usize| if low > 0.0 { of(k) / curvature - 1.0 } else { 0.0 };
     if above == 0 {
-        return vec![(0, 1.0, stretch(0, of(0)))];
+        return vec![Part { node: 0, weight: 1.0, bend: bend(0), scale }];
     }
-    let (high, low) = (of(above - 1), of(above));
-    let weight = (curvature - low) / (high - low);
-    vec![(above - 1, weight, stretch(above - 1, low)), (above, 1.0 - weight, stretch(above, low))]
+    let weight = (curvature - low) / (of(above - 1) - low);
+    let part = |node: usize, weight| Part { node, weight, bend: bend(node), scale };
+    vec![part(above - 1, weight), part(above, 1.0 - weight)]
 }
 
 /// shape(r) of the three channels.
 pub(super) fn shapes(matter: Matter, r: f64) -> DVec3 {
-    nodes(matter).into_iter().map(|(k, w, c)| w * c * c * Node::of(matter, k).values(r * r * c * c)).sum()
+    parts(matter).iter().map(|part| part.values(matter, r)).sum()
 }
 
 /// Density of the sampled radii per area of the plane.
 pub(super) fn density(matter: Matter, r: f64) -> f64 {
-    let part = |(k, w, c): (usize, f64, f64)| {
-        let node = Node::of(matter, k);
-        w * c * c * (node.values(r * r * c * c) * node.vector(2)).dot(matter.material.density.as_dvec3())
+    let of = |part: &Part| {
+        let normalised = part.values(matter, r) * Node::of(matter, part.node).vector(2);
+        normalised.dot(matter.material.density.as_dvec3())
     };
-    nodes(matter).into_iter().map(part).sum()
+    parts(matter).iter().map(of).sum()
 }
 
 /// The radius that the numbers pick in channel c: `share` the node, u the distance.
 pub(super) fn radius(matter: Matter, c: usize, share: f64, u: f64) -> f64 {
-    let nodes = nodes(matter);
-    let (k, _, stretch) = nodes[usize::from(nodes.len() > 1 && share >= nodes[0].1)];
-    Node::of(matter, k).column(c).draw(u).sqrt() / stretch
+    let parts = parts(matter);
+    let part = &parts[usize::from(parts.len() > 1 && share >= parts[0].weight)];
+    part.unbent(Node::of(matter, part.node).column(c).draw(u))
 }
 
 /// The factor 1 + k (1 - mu') on light that enters, or 1 over its mean times it on light that leaves, at the cosine
 /// outside.
 pub(super) fn obliqueness(matter: Matter, cos: f64, leaving: bool) -> DVec3 {
-    let slope: DVec3 = nodes(matter).into_iter().map(|(k, w, _)| w * Node::of(matter, k).vector(5)).sum();
+    let slope: DVec3 = parts(matter).iter().map(|part| part.weight * Node::of(matter, part.node).vector(5)).sum();
     let n = f64::from(matter.material.ior);
     let inside = (1.0 - (1.0 - cos * cos) / (n * n)).max(0.0).sqrt();
     let factor = DVec3::ONE + slope * (1.0 - inside);
