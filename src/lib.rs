@@ -59,16 +59,19 @@
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
+//! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like |
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`measure`] | all of these | numeric experiments: kernels beside closed forms |
+//! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
 //! The extremes that renders survive, each with its test, are in [`extremes`].
 //!
 //! The program uses this public interface alone. There is no global state: devices and renderers stand side by side.
 
+pub mod curvature;
 pub mod error;
 #[doc = include_str!("docs/extremes.md")]
 pub mod extremes {}
@@ -77,6 +80,7 @@ pub mod image;
 pub mod inspect;
 pub mod measure;
 pub mod model;
+pub mod model_errors;
 pub mod prepare;
 pub mod reference;
 pub mod render;

@@ -3,6 +3,7 @@
 mod boundary;
 #[path = "../common/mod.rs"]
 mod common;
+mod curvature;
 mod density;
 mod edge;
 mod light;
@@ -18,3 +19,4 @@ mod stages;
 mod table;
 mod texture;
 mod walk;
+mod walk_models;

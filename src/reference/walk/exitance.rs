@@ -1,6 +1,6 @@
 //! A body in the light: what leaves each part of its surface.
 
-use super::shape::Body;
+use super::shape::{Body, Site};
 use super::{End, Estimate, Matter, Random, Tally, entered, walk};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -12,6 +12,17 @@ pub enum Light {
     Directional(DVec3),
     /// Radiance 1 from everywhere.
     Uniform,
+}
+
+impl Light {
+    /// Flux through the disk in which paths start.
+    pub(super) fn flux(self, body: &impl Body) -> f64 {
+        let (_, radius) = body.ball();
+        match self {
+            Light::Directional(_) => PI * radius * radius,
+            Light::Uniform => 4.0 * PI * PI * radius * radius,
+        }
+    }
 }
 
 /// How a surface is divided.
@@ -56,9 +67,9 @@ pub fn exitance(
     let stride = count + 2;
     let all = stride * absorptions.len();
     let tally = Tally::run(all + 1, paths, seed, |random, tally| {
-        let Some((position, direction)) = enter(body, matter.ior, light, random) else { return };
+        let Some((site, _, inside)) = enter(body, matter.ior, light, random) else { return };
         tally.add(all, 1.0);
-        let exit = match walk(body, &matter, position, direction, random) {
+        let exit = match walk(body, &matter, site.position, inside, random) {
             End::Left(exit) => exit,
             End::Absorbed => return,
             End::Lost => {
@@ -76,11 +87,7 @@ pub fn exitance(
             }
         }
     });
-    let (_, radius) = body.ball();
-    let flux = match light {
-        Light::Directional(_) => PI * radius * radius,
-        Light::Uniform => 4.0 * PI * PI * radius * radius,
-    };
+    let flux = light.flux(body);
     let result = |row: usize| Exitance {
         bins: (0..count).map(|bin| tally.estimate(row * stride + bin).scaled(flux)).collect(),
         scattered: tally.estimate(row * stride + count).scaled(flux),
@@ -91,16 +98,16 @@ pub fn exitance(
     (0..absorptions.len()).map(result).collect()
 }
 
-/// Where and in which direction inside a path enters, if it meets the body and is not reflected.
-fn enter(body: &impl Body, ior: f64, light: Light, random: &mut Random) -> Option<(DVec3, DVec3)> {
+/// Where light enters, and its direction outside and inside; none if it misses the body or is reflected.
+pub(super) fn enter(body: &impl Body, ior: f64, light: Light, random: &mut Random) -> Option<(Site, DVec3, DVec3)> {
     let travel = match light {
         Light::Directional(direction) => direction,
         Light::Uniform => random.direction(),
     };
     let origin = disk(body, travel, random.next(), random.next());
-    let (distance, normal, _) = body.enter(origin, travel)?;
-    let inside = entered(ior, travel, normal, random)?;
-    Some((origin + travel * distance, inside))
+    let site = body.enter(origin, travel)?;
+    let inside = entered(ior, travel, site.normal, random)?;
+    Some((site, travel, inside))
 }
 
 /// A point of the disk across `travel` in front of the body, uniform for two uniform numbers in [0, 1).
@@ -121,9 +128,9 @@ pub fn seen(body: &impl Body, ior: f64, forward: DVec3, bins: Bins, rays: u32) -
     let place = |i: u32| (f64::from(i) + 0.5) / f64::from(rays);
     for (i, j) in (0..rays).flat_map(|i| (0..rays).map(move |j| (i, j))) {
         let origin = disk(body, forward, place(i), place(j));
-        if let Some((distance, normal, part)) = body.enter(origin, forward) {
-            let (reflectance, _) = super::interface(ior, (-forward.dot(normal)).max(0.0));
-            weights[(bins.of)(origin + forward * distance, part)] += 1.0 - reflectance;
+        if let Some(site) = body.enter(origin, forward) {
+            let (reflectance, _) = super::interface(ior, (-forward.dot(site.normal)).max(0.0));
+            weights[(bins.of)(site.position, site.place)] += 1.0 - reflectance;
         }
     }
     weights

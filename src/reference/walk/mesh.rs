@@ -1,7 +1,7 @@
 //! A body bounded by triangles, and the tree that finds them.
 
 use super::Random;
-use super::shape::{Body, Met, Shape};
+use super::shape::{Body, Met, Shape, Site};
 use glam::{DVec3, dvec3};
 use std::f64::consts::{PI, TAU};
 
@@ -137,14 +137,15 @@ impl Mesh {
         self.triangles.len()
     }
 
-    /// Area of all triangles.
-    pub fn area(&self) -> f64 {
-        *self.areas.last().expect("a mesh has triangles")
-    }
-
     /// Enclosed volume.
     pub fn volume(&self) -> f64 {
         self.triangles.iter().map(|t| t.corner.dot(t.edge1.cross(t.edge2)) / 6.0).sum()
+    }
+
+    /// A triangle's vertices.
+    pub fn corners(&self, index: usize) -> Corners {
+        let t = &self.triangles[index];
+        [t.corner, t.corner + t.edge1, t.corner + t.edge2]
     }
 
     /// A triangle's area, outward normal and centre.
@@ -153,20 +154,39 @@ impl Mesh {
         (t.edge1.cross(t.edge2).length() / 2.0, t.normal, t.corner + (t.edge1 + t.edge2) / 3.0)
     }
 
-    /// A point uniform over triangle `index`.
-    pub fn point(&self, index: usize, random: &mut Random) -> DVec3 {
-        let t = &self.triangles[index];
-        let (mut u, mut v) = (random.next(), random.next());
-        if u + v > 1.0 {
-            (u, v) = (1.0 - u, 1.0 - v);
+    /// Divides the surface into parts of at most 1 / `count` of its area (but for single triangles), compact and facing
+    /// one way: the part of each triangle, and the areas of the parts.
+    pub fn parts(&self, count: usize) -> (Vec<usize>, Vec<f64>) {
+        let mut facing: [Vec<usize>; 6] = Default::default();
+        for index in 0..self.len() {
+            let normal = self.triangles[index].normal;
+            let axis = normal.abs().max_position();
+            facing[2 * axis + usize::from(normal[axis] > 0.0)].push(index);
         }
-        t.corner + u * t.edge1 + v * t.edge2
-    }
-
-    /// A triangle drawn by area.
-    pub fn pick(&self, random: &mut Random) -> usize {
-        let at = random.next() * self.area();
-        self.areas.partition_point(|&sum| sum <= at).min(self.len() - 1)
+        let area = |group: &[usize]| group.iter().map(|&index| self.facet(index).0).sum::<f64>();
+        let mut waiting: Vec<Vec<usize>> = facing.into_iter().filter(|group| !group.is_empty()).collect();
+        let (mut part, mut areas) = (vec![0; self.len()], Vec::new());
+        while let Some(mut group) = waiting.pop() {
+            let whole = area(&group);
+            if group.len() == 1 || whole <= self.area() / count as f64 * (1.0 + 1e-9) {
+                group.iter().for_each(|&index| part[index] = areas.len());
+                areas.push(whole);
+                continue;
+            }
+            let centre = |index: usize| self.facet(index).2;
+            let low = group.iter().fold(DVec3::INFINITY, |low, &index| low.min(centre(index)));
+            let high = group.iter().fold(DVec3::NEG_INFINITY, |high, &index| high.max(centre(index)));
+            let axis = (high - low).max_position();
+            group.sort_by(|&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
+            let mut sum = 0.0;
+            let half = group.iter().position(|&index| {
+                sum += self.facet(index).0;
+                sum >= whole / 2.0
+            });
+            let rest = group.split_off((half.unwrap_or(0) + 1).min(group.len() - 1));
+            waiting.extend([group, rest]);
+        }
+        (part, areas)
     }
 
     /// Calls `hit` with distance and triangle of what the ray meets up to `limit`, in no order; it returns the new limit.
@@ -269,8 +289,33 @@ impl Body for Mesh {
         self.ball
     }
 
-    fn enter(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3, usize)> {
+    fn enter(&self, origin: DVec3, direction: DVec3) -> Option<Site> {
         let (t, place) = self.nearest(origin, direction, f64::INFINITY, false)?;
-        Some((t, self.triangles[place].normal, place))
+        Some(Site { position: origin + t * direction, normal: self.triangles[place].normal, place })
+    }
+
+    fn area(&self) -> f64 {
+        *self.areas.last().expect("a mesh has triangles")
+    }
+
+    fn sample(&self, random: &mut Random) -> Site {
+        let at = random.next() * self.area();
+        let place = self.areas.partition_point(|&sum| sum <= at).min(self.len() - 1);
+        let t = &self.triangles[place];
+        let (mut u, mut v) = (random.next(), random.next());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        Site { position: t.corner + u * t.edge1 + v * t.edge2, normal: t.normal, place }
+    }
+
+    fn meetings(&self, origin: DVec3, direction: DVec3, sites: &mut Vec<Site>) {
+        // A ray that starts outside of the mesh.
+        let back = (origin - self.ball.0).dot(direction) + 2.0 * self.ball.1;
+        let start = origin - back * direction;
+        self.visit(start, direction, f64::INFINITY, |t, place| {
+            sites.push(Site { position: start + t * direction, normal: self.triangles[place].normal, place });
+            f64::INFINITY
+        });
     }
 }

@@ -20,6 +20,7 @@
 
 pub mod exitance;
 pub mod mesh;
+pub mod model;
 pub mod searchlight;
 pub mod shape;
 

@@ -1,6 +1,8 @@
 //! Bodies that are filled with matter.
 
+use super::Random;
 use glam::DVec3;
+use std::f64::consts::PI;
 
 /// What a straight piece of a path meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +13,16 @@ pub enum Met {
     Surface { distance: f64, normal: DVec3, place: usize },
     /// It does not start inside.
     Outside,
+}
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    pub position: DVec3,
+    /// Outward, unit.
+    pub normal: DVec3,
+    /// Part of the surface, as the shape counts them.
+    pub place: usize,
 }
 
 /// A region of space.
@@ -24,8 +36,17 @@ pub trait Body: Shape {
     /// Centre and radius of a ball that holds it.
     fn ball(&self) -> (DVec3, f64);
 
-    /// Distance at which a ray from outside first meets the surface, and the outward normal and place there.
-    fn enter(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3, usize)>;
+    /// Where a ray from outside first meets the surface.
+    fn enter(&self, origin: DVec3, direction: DVec3) -> Option<Site>;
+
+    /// Area of the surface.
+    fn area(&self) -> f64;
+
+    /// A point uniform over the surface.
+    fn sample(&self, random: &mut Random) -> Site;
+
+    /// Every point in which the line meets the surface, into `sites`.
+    fn meetings(&self, origin: DVec3, direction: DVec3, sites: &mut Vec<Site>);
 }
 
 /// Everything below z = 0.
@@ -89,10 +110,32 @@ impl Body for Sphere {
         (DVec3::ZERO, self.radius)
     }
 
-    fn enter(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3, usize)> {
+    fn enter(&self, origin: DVec3, direction: DVec3) -> Option<Site> {
         let along = origin.dot(direction);
         let inside = along * along - (origin.length_squared() - self.radius * self.radius);
         let distance = -along - inside.max(0.0).sqrt();
-        (inside >= 0.0 && distance >= 0.0).then(|| (distance, (origin + direction * distance).normalize(), 0))
+        (inside >= 0.0 && distance >= 0.0).then(|| self.site(origin + direction * distance))
+    }
+
+    fn area(&self) -> f64 {
+        4.0 * PI * self.radius * self.radius
+    }
+
+    fn sample(&self, random: &mut Random) -> Site {
+        self.site(random.direction() * self.radius)
+    }
+
+    fn meetings(&self, origin: DVec3, direction: DVec3, sites: &mut Vec<Site>) {
+        let along = origin.dot(direction);
+        let inside = along * along - (origin.length_squared() - self.radius * self.radius);
+        if inside >= 0.0 {
+            sites.extend([-1.0, 1.0].map(|sign| self.site(origin + direction * (sign * inside.sqrt() - along))));
+        }
+    }
+}
+
+impl Sphere {
+    fn site(&self, position: DVec3) -> Site {
+        Site { position, normal: position.normalize(), place: 0 }
     }
 }

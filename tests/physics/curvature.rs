@@ -1,0 +1,52 @@
+//! The locally alike sphere: exact on spheres, a plane where a body is flat and thick, closed forms on plates.
+
+use glam::{DVec3, dvec3};
+use translucent::curvature::of_mesh;
+use translucent::reference::math::integrate;
+use translucent::reference::walk::mesh::{Corners, Mesh};
+
+#[test]
+fn a_sphere_is_its_own() {
+    let mesh = Mesh::capsule(2.0, 0.0, 64);
+    let corners: Vec<Corners> = (0..mesh.len()).map(|index| mesh.corners(index)).collect();
+    for length in [1.0, 4.0, 20.0, 1e6] {
+        // Facets are flat: what lies within one is not seen.
+        for radius in of_mesh(&corners, length, 64) {
+            assert!((radius * 2.0 - 1.0).abs().max_element() < 0.05, "L {length}: 1/a {radius}");
+        }
+    }
+}
+
+#[test]
+fn a_plate_is_a_plane_unless_it_is_thin() {
+    // In the middle of a wide plate of thickness h: G = E_2(h / L).
+    let (length, width) = (1.0, 60.0);
+    for (thickness, count) in [(0.5, 1), (2.0, 1), (10.0, 1)] {
+        let mesh = Mesh::cuboid(dvec3(width, width, thickness), 3);
+        let corners: Vec<Corners> = (0..mesh.len()).map(|index| mesh.corners(index)).collect();
+        let g = integrate(0.0, 1.0, 8, |cos| (-thickness / (length * cos)).exp());
+        let found = of_mesh(&corners, length, 64);
+        let middle = corners.iter().zip(found).filter(|(t, _)| {
+            let centre = (t[0] + t[1] + t[2]) / 3.0;
+            centre.truncate().length() < 5.0 * f64::from(count) && t.iter().all(|c| c.z.abs() == thickness / 2.0)
+        });
+        let mut seen = 0;
+        for (_, inverse) in middle {
+            seen += 1;
+            let x = 2.0 / (length * f64::from(inverse.x));
+            let expected = (1.0 - (-x).exp()) / x;
+            // Sixty-four directions; grazing ones count little.
+            assert!((expected - g).abs() < 2e-3 + 0.02 * g, "h {thickness}: G {expected} for {g}");
+        }
+        assert!(seen > 0, "no triangle in the middle");
+    }
+}
+
+#[test]
+fn open_surfaces_are_half_spaces() {
+    let square: [Corners; 2] =
+        [[DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y], [DVec3::ZERO, DVec3::X + DVec3::Y, DVec3::Y]];
+    for inverse in of_mesh(&square, 0.5, 16) {
+        assert!(inverse.max_element() < 1e-9, "{inverse}");
+    }
+}
