@@ -6,19 +6,19 @@
 //!
 #![doc = include_str!("../docs/model_errors.md")]
 
+mod models;
 mod plane;
 mod scenes;
 
 pub use plane::{Truth, Verdict};
 pub use scenes::{Figure, Scene};
 
-use crate::reference::profile::{Coefficients, Profile, constant};
 use crate::reference::walk::exitance::{Bins, exitance, seen};
 use crate::reference::walk::mesh::Corners;
 use crate::reference::walk::model::{Prediction, Transfer, predict};
 use crate::reference::walk::{Estimate, Matter};
-use crate::settings::Model;
 use glam::DVec3;
+use models::{Named, models};
 use std::f64::consts::PI;
 use std::fmt::Write;
 
@@ -75,23 +75,6 @@ pub fn corners(scene: &crate::Scene) -> Vec<Corners> {
     corners.filter(|[a, b, c]| (b - a).cross(c - a).length_squared() > 0.0).collect()
 }
 
-/// Every model of the renderer for this matter.
-fn models(matter: &Matter) -> Vec<(&'static str, Box<dyn Transfer>)> {
-    let coefficients = Coefficients {
-        sigma_s_prime: matter.sigma_s_prime(),
-        sigma_a: matter.sigma_a,
-        g: matter.g,
-        ior: matter.ior,
-        appearance: None,
-    };
-    let transfer = |&(model, name): &(Model, &'static str)| {
-        let profile = Profile::new(constant(model)?, &coefficients);
-        let transfer: Box<dyn Transfer> = Box::new(move |r: f64| profile.rd(r));
-        Some((name, transfer))
-    };
-    Model::NAMES.iter().filter_map(transfer).collect()
-}
-
 /// The bodies; `spot` is a closed mesh of that name.
 pub fn bodies(spot: &[Corners]) -> Vec<Scene> {
     let mut all: Vec<Scene> = [1.0, 3.0, 10.0, 100.0].map(Scene::sphere).into();
@@ -104,7 +87,7 @@ pub fn bodies(spot: &[Corners]) -> Vec<Scene> {
 pub fn on_plane(matter: (&'static str, Matter), effort: Effort) -> Vec<Row> {
     let (name, matter) = matter;
     let truth = Truth::new(matter, effort.paths, effort.seed);
-    let judge = |(model, transfer): (&'static str, Box<dyn Transfer>)| {
+    let judge = |(model, transfer): Named| {
         let verdict = truth.judge(matter.ior, &*transfer);
         let row = |scene: &str, all, l1| Row {
             matter: name,
@@ -118,7 +101,7 @@ pub fn on_plane(matter: (&'static str, Matter), effort: Effort) -> Vec<Row> {
         };
         [row("plane, thin beam", verdict.beam, Some(verdict.l1)), row("plane, even light", verdict.even, None)]
     };
-    models(&matter).into_iter().flat_map(judge).collect()
+    models(&matter, None).into_iter().flat_map(judge).collect()
 }
 
 /// The models on a body.
@@ -127,7 +110,7 @@ pub fn on_body(matter: (&'static str, Matter), scene: &Scene, effort: Effort) ->
     let bins = Bins { count: scene.areas.len(), of: &|position, place| scene.bin(position, place) };
     let body = &scene.figure;
     let truth = exitance(body, matter, &[matter.sigma_a], scene.light, bins, effort.paths, effort.seed).remove(0);
-    let models = models(&matter);
+    let models = models(&matter, Some(scene));
     let transfers: Vec<&dyn Transfer> = models.iter().map(|(_, model)| &**model).collect();
     let diffuse = 1.0 / (3.0 * matter.sigma_a).sqrt().max(1e-3);
     let lengths = [0.1, 1.0, diffuse];
@@ -140,7 +123,7 @@ pub fn on_body(matter: (&'static str, Matter), scene: &Scene, effort: Effort) ->
         let variance: f64 = bins.iter().zip(&weights).map(|(bin, weight)| (bin.error * weight).powi(2)).sum();
         Estimate { mean, error: variance.sqrt() }
     };
-    let row = |(prediction, (model, _)): (&Prediction, &(&'static str, Box<dyn Transfer>))| {
+    let row = |(prediction, (model, _)): (&Prediction, &Named)| {
         let pairs = || prediction.bins.iter().zip(&truth.bins);
         let wrong: f64 = pairs().map(|(a, b)| (a.mean - b.mean).abs()).sum();
         let noise: f64 = pairs().map(|(a, b)| a.error.hypot(b.error)).sum();
