@@ -4,6 +4,25 @@
 //! the model stands in its place ([`predict`](crate::reference::walk::model::predict)), so that light, bins and boundary
 //! are the same. No kernel and no twin of the projection takes part.
 //!
+//! # How to read the tables
+//! Lengths are in reduced mean free paths 1 / sigma_t'; scattering is isotropic; light is directional and looked at from
+//! 60 degrees aside. A cell holds percent of what leaves by the walk: the signed error of all light that leaves, of the
+//! mean that a camera sees, and the sum of the absolute errors of some two dozen parts of the surface. On the half-space
+//! there is no camera, and a thin beam's parts are rings. "unscattered" is the part of the entering light that crosses the
+//! body straight; it is not compared, but the spheres of the table model hold it, and show it as an excess where it is
+//! large. Standard errors, and what noise alone makes of the last number, are in `src/docs/model_errors.csv`.
+//!
+//! # What they say
+//! - A profile of the half-space loses light on small and thin bodies, whichever it is. "table, sphere" takes at each
+//!   point the profile of the sphere that the body is [locally like](mod@crate::curvature), which mends the mean on
+//!   spheres, capsules and animals.
+//! - It overshoots on plates thinner than three diffuse mean free paths: within a chord r there lies up to twice the area
+//!   pi r^2 of a sphere, so that more light leaves than the profile holds. Dividing by the integral of the profile over
+//!   the body at each point would mend that; it is not built.
+//! - The directional dipole makes light; Burley's lengths are fits for index-matched matter.
+//!
+//! `cargo run --release --example model_errors` measures them anew.
+//!
 #![doc = include_str!("../docs/model_errors.md")]
 
 mod models;
