@@ -13,7 +13,7 @@
 //! large. Standard errors, and what noise alone makes of the last number, are in `src/docs/model_errors.csv`.
 //!
 //! # What they say
-//! - A profile of the half-space loses light on small and thin bodies, whichever it is. "table, sphere" takes at each
+//! - A profile of the half-space loses light on small and thin bodies, whichever it is. "table on spheres" takes at each
 //!   point the profile of the sphere that the body is [locally like](mod@crate::curvature), which mends the mean on
 //!   spheres, capsules and animals.
 //! - It overshoots on plates thinner than three diffuse mean free paths: within a chord r there lies up to twice the area

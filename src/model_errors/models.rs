@@ -45,7 +45,7 @@ pub fn models(matter: &Matter, scene: Option<&Scene>) -> Vec<Named> {
     };
     let mut all: Vec<Named> = Model::NAMES.iter().filter_map(transfer).collect();
     let curvatures = scene.map_or(vec![0.0], |scene| curvatures(scene, 1.0 / (3.0 * matter.sigma_a).sqrt()));
-    all.push(("table, sphere", Box::new(Table::new(&coefficients, curvatures))));
+    all.push(("table on spheres", Box::new(Table::new(&coefficients, curvatures))));
     all
 }
 
