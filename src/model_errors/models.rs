@@ -27,6 +27,7 @@ pub fn models(matter: &Matter, scene: Option<&Scene>) -> Vec<Named> {
         sigma_a: matter.sigma_a,
         g: matter.g,
         ior: matter.ior,
+        rough: None,
         appearance: None,
     };
     let transfer = |&(model, name): &(Model, &'static str)| -> Option<Named> {
