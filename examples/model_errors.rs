@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example model_errors -- [PATHS] [FOLDER]
 //!
-//! PATHS of the walk in each scene (2000000, about half an hour on two cores); FOLDER (src/docs) gets model_errors.md and
+//! PATHS of the walk in each scene (2000000; the published table has 10000); FOLDER (src/docs) gets model_errors.md and
 //! model_errors.csv.
 
 use std::path::PathBuf;

@@ -11,6 +11,7 @@
 //! there is no camera, and a thin beam's parts are rings. "unscattered" is the part of the entering light that crosses the
 //! body straight; it is not compared, but the spheres of the table model hold it, and show it as an excess where it is
 //! large. Standard errors, and what noise alone makes of the last number, are in `src/docs/model_errors.csv`.
+//! Ten thousand paths a scene: means are good to 1 to 3 %, absolute errors of parts below about 10 % on meshes are noise.
 //!
 //! # What they say
 //! - A profile of the half-space loses light on small and thin bodies, whichever it is. "table on spheres" takes at each
