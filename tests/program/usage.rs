@@ -87,6 +87,7 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
     assert_eq!(
         options,
         [
+            "--albedo-mapping",
             "--aov",
             "--camera",
             "--crop",
@@ -97,6 +98,7 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
             "--environment-scale",
             "--exposure",
             "--help",
+            "--kappa",
             "--material",
             "--model",
             "--normalisation",
@@ -104,6 +106,8 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
             "--png",
             "--projection",
             "--quiet",
+            "--reciprocal",
+            "--renormalise",
             "--reproject",
             "--resolution",
             "--samples",
