@@ -120,7 +120,7 @@ fn world(seed: u32) -> Case {
     scene.triangles.iter_mut().for_each(|triangle| triangle.set = 0);
 
     let projection = random.pick(&[Projection::Mis, Projection::Mis, Projection::Normal, Projection::Camera]);
-    let built = [Model::Standard];
+    let built = [Model::Standard, Model::Better, Model::Burley, Model::Directional];
     let model = built[seed as usize % built.len()];
     let settings = Settings { resolution: Some((PIXELS / 8, 8)), projection, seed, ..Settings::default() };
     let mut case = Case::new(scene, &settings);
