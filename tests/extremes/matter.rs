@@ -83,7 +83,7 @@ fn every_matter_has_its_radiance() {
                 let mean = pixels.iter().map(|p| f64::from(light[*p])).sum::<f64>() / 4.0;
                 let error = pixels.iter().map(|p| f64::from(variance[*p])).sum::<f64>().sqrt() / 4.0;
                 let (sigma_s_prime, sigma_a) = (extinction * albedo[c], extinction * (1.0 - albedo[c]));
-                let matter = Coefficients { sigma_s_prime, sigma_a, g: 0.0, ior: *ior, appearance: None };
+                let matter = Coefficients { sigma_s_prime, sigma_a, g: 0.0, ior: *ior, appearance: None, rough: None };
                 let expected = leaving * Profile::new(constant, &matter).cdf(2.0);
                 let what = format!("{model}, sigma_t' {extinction}, n {ior}, alpha' {}: {mean} +- {error}", albedo[c]);
                 if albedo[c] == 0.0 {
