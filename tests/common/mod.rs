@@ -11,7 +11,6 @@ use translucent::reference::reproject::reproject;
 use translucent::reference::sample::sample;
 use translucent::reference::sums::Contribution;
 use translucent::reference::{Inputs, step};
-use translucent::settings::Model;
 use translucent::shared::*;
 
 /// Owner of everything that [`Inputs`] borrows.
@@ -146,11 +145,6 @@ pub fn standard(sigma_s: DVec3, sigma_a: DVec3, ior: f64, normalisation: Normali
 /// Matter in three channels under a model, one of MODEL_*.
 pub fn modelled(model: u32, sigma_s: DVec3, sigma_a: DVec3, ior: f64, options: Options) -> Material {
     profile::material(model, &channels(sigma_s, sigma_a, ior), options)
-}
-
-/// Matter under a model that is built.
-pub fn modelled_as(model: Model, matter: &[Coefficients; 3], options: Options) -> Material {
-    profile::material(profile::constant(model).expect("the model is built"), matter, options)
 }
 
 /// Three channels of isotropic matter.

@@ -3,7 +3,6 @@
 
 use crate::{
     Case, bench,
-    common::modelled_as,
     scenes::{Eye, Mesh, gltf, matter, scene, sun},
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -16,7 +15,7 @@ use translucent::{
         self, Inputs,
         accumulate::accumulate,
         primary::primary,
-        profile::{Coefficients, Options},
+        profile::{self, Coefficients, Options},
         random::{hash, unit},
         reflect::reflect,
         reproject::reproject,
@@ -80,7 +79,7 @@ fn random_material(random: &mut Random, model: Model, projection: Projection) ->
         radius_tail: random.pick(&[1e-6, 0.0]),
         directional: Default::default(),
     };
-    let mut material = modelled_as(model, &channels, options);
+    let mut material = profile::material(profile::constant(model).expect("the model is built"), &channels, options);
     material.radius_max = material.radius_max.min(SET_DIAMETER);
     material.alpha = random.pick(&[0.0, 0.0, 1e-6, 1e-3, 0.1, 1.0]);
     material.base_color = random.point().abs().as_vec3();
