@@ -30,12 +30,12 @@ const SIGHT: f64 = 12.0;
 /// Vertices closer than an internal unit over this are one.
 const GRID: f64 = (1 << 20) as f64;
 
-/// 1 / a [1/internal unit] at the three vertices of each triangle, in their order; a set's `lengths` entry is its L (>
-/// 0; as long as the body is large, it may be infinite).
+/// 1 / a [1/internal unit] at the three vertices of each triangle, in their order; a set's entry of `lengths` is its L (>
+/// 0; it may be infinite). A set without one has 0.
 ///
 /// Rays start from three points of each triangle, at its own normal; a vertex has the mean of the triangles around it. A
 /// ray that finds no surface counts as unbounded, so open meshes are surfaces of matter that goes on behind them.
-pub fn inverse_radii(triangles: &[Triangle], lengths: &[f64]) -> Vec<Vec3> {
+pub fn inverse_radii(triangles: &[Triangle], lengths: &[Option<f64>]) -> Vec<Vec3> {
     let mut sets: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
         sets.entry(triangle.set).or_default().push(index);
@@ -43,7 +43,7 @@ pub fn inverse_radii(triangles: &[Triangle], lengths: &[f64]) -> Vec<Vec3> {
     let directions = (RAYS / (3 * triangles.len().max(1))).clamp(DIRECTIONS.1, DIRECTIONS.0);
     let mut radii = vec![Vec3::ZERO; triangles.len()];
     for (set, members) in sets {
-        let length = lengths.get(set as usize).copied().unwrap_or(f64::INFINITY).min(1e6);
+        let Some(length) = lengths[set as usize].map(|length| length.min(1e6)) else { continue };
         let corners: Vec<Corners> = members.iter().map(|&index| corners(&triangles[index])).collect();
         for (index, found) in members.iter().zip(of_mesh(&corners, length, directions)) {
             radii[*index] = found;

@@ -1,6 +1,7 @@
 //! A scene and settings become what kernels read: f64 metres in, shared structs in internal units out.
 
 use crate::{
+    curvature,
     error::{Error, Result},
     model::{self, Advice},
     reference::{
@@ -10,7 +11,7 @@ use crate::{
         single::Scattering,
         texture,
     },
-    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap, curvature::curvatures},
+    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Set, Wrap},
     settings::{Model, Projection, Settings},
     shared::{self, Emitter, Features, Light, Material, TABLE_NODES, TRANSLUCENT, TWO_SIDED, Texture, View},
 };
@@ -404,9 +405,28 @@ fn textures(scene: &Scene) -> (Vec<u32>, Vec<Texture>, u32) {
 
 /// Curvatures at the vertices of the triangles, if a material has the table model and settings ask for them.
 fn thickness(scene: &Scene, settings: &Settings, advice: &[Option<Advice>]) -> Vec<Vec3> {
-    let tabulated = |advice: &Option<Advice>| advice.as_ref().is_some_and(|a| a.choice.model == Model::Table);
-    let wanted: Vec<bool> = advice.iter().map(tabulated).collect();
-    if settings.curvature && wanted.contains(&true) { curvatures(scene, &wanted) } else { vec![] }
+    let tabulated = |m: &usize| advice[*m].as_ref().is_some_and(|a| a.choice.model == Model::Table);
+    // Where a set holds several media, the first one's light says how far to look around.
+    let length = |set: &Set| {
+        let medium = scene.materials[set.materials.iter().copied().find(tabulated)?].medium.as_ref()?;
+        Some(curvature::REACH * diffuse_mean_free_path(medium) * scene.frame.scale)
+    };
+    let lengths: Vec<Option<f64>> = scene.sets.iter().map(length).collect();
+    let wanted = settings.curvature && lengths.iter().any(Option::is_some);
+    if wanted { curvature::inverse_radii(&scene.triangles, &lengths) } else { vec![] }
+}
+
+/// 1 / sigma_tr (m), the geometric mean of the channels that scatter and absorb; infinite where none does.
+fn diffuse_mean_free_path(medium: &Medium) -> f64 {
+    let rates = [0, 1, 2].map(|c| {
+        let (scattering, absorption) = (medium.sigma_s_prime[c], medium.sigma_a[c]);
+        if scattering > 0.0 { (3.0 * absorption * (scattering + absorption)).sqrt() } else { 0.0 }
+    });
+    let logarithms: Vec<f64> = rates.into_iter().filter(|&rate| rate > 0.0).map(f64::ln).collect();
+    if logarithms.is_empty() {
+        return f64::INFINITY;
+    }
+    (-logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp()
 }
 
 /// Radii 2^(i/2 - 1) of the spheres between which a material's profiles are interpolated: those around the curvatures of

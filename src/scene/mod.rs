@@ -3,7 +3,6 @@
 mod accessor;
 mod bvh;
 mod camera;
-pub mod curvature;
 mod environment;
 mod frame;
 mod gltf;
