@@ -37,7 +37,7 @@ use crate::{
     image::Image,
     render::Renderer,
     scene::{Environment, LoadOptions, Scene},
-    settings::{Model, Settings},
+    settings::{Model, Settings, SingleScattering},
 };
 use glam::DVec3;
 use serde_json::Value;
@@ -87,7 +87,9 @@ impl Setup<'_> {
 
     /// Renders a scene whose geometry is in mm.
     fn render(&self, matter: &Matter, scene: &Scene, settings: Settings, samples: u32) -> Result<Image> {
-        let settings = Settings { seed: self.seed, model: matter.model, ..settings };
+        // Closed forms are of the profile alone.
+        let single_scattering = SingleScattering::Off;
+        let settings = Settings { seed: self.seed, model: matter.model, single_scattering, ..settings };
         let mut renderer = Renderer::new(self.device, scene, &settings)?;
         renderer.render(samples)?;
         renderer.finish()

@@ -11,7 +11,7 @@ use crate::{
 use glam::DVec3;
 use serde_json::{Value, json};
 use translucent::{
-    Model, Normalisation, Projection, Settings,
+    Model, Normalisation, Projection, Settings, SingleScattering,
     reference::area::{Corners, Lamp, Matter, Setting, leaving},
     scene::Environment,
 };
@@ -86,8 +86,14 @@ impl Experiment {
             if projection == Projection::Normal && self.meshes.iter().any(|mesh| mesh.indices.len() < 200) {
                 continue;
             }
-            let settings =
-                Settings { resolution: Some((8, 8)), seed: 17, projection, model: self.model, ..Settings::default() };
+            let settings = Settings {
+                resolution: Some((8, 8)),
+                seed: 17,
+                projection,
+                model: self.model,
+                single_scattering: SingleScattering::Off,
+                ..Settings::default()
+            };
             let image = render(&scene, &settings, 256);
             for (c, letter) in ["R", "G", "B"].into_iter().enumerate() {
                 let values = channel(&image, &format!("subsurface.{letter}"));
