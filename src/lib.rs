@@ -30,10 +30,12 @@
 //!   (checked, f64 metres;  (f32,      Nodes Triangles Shadings Materials
 //!    geometry centred and   internal  Lights Environment EnvironmentCdf ─────► buffers   per scene
 //!    scaled)                units)    Emitters EmitterCdf Boundaries
+//!                                     Texels Textures Coordinates
+//!                                     Profiles Thickness
 //!                                     View ──────────────────────────────────► buffer    per render
 //!
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
-//!   primary                       sample         reproject       accumulate, reflect             resolve
+//!   primary                       sample         reproject       accumulate, single, reflect     resolve
 //!   └► Surfaces[pixel, batch]     └► Probes      └► HitLists     └► RunningSums, BatchSums       └► Pixels ─► Image
 //! ```
 //!
@@ -58,6 +60,7 @@
 //! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
+//! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
 //! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like |
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model` | [`Scene`] and [`Settings`] to what kernels read |
