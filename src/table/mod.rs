@@ -6,8 +6,8 @@
 //!
 //! # Where a table comes from
 //! For isotropic scattering and the indices of refraction [`SHIPPED_IORS`] the crate ships tables (`cargo run --release
-//! --example tables` makes them). Any other index or g is simulated when first needed: the half-space alone, some
-//! seconds of all cores, and kept in the [`cache`]; what spheres change is taken from the shipped tables at the same reduced
+//! --example tables` makes them). Any other index or g is simulated when first needed: the half-space alone, less
+//! than a minute of two cores, and kept in the [`cache`]; what spheres change is taken from the shipped tables at the same reduced
 //! coefficients (similarity), between the nearest two indices.
 //!
 //! # Errors
