@@ -5,6 +5,7 @@ use super::{
     buffer::Staging,
     c_name,
     instance::{Candidate, DeviceInfo, Instance, ValidationLog},
+    kernel::Compiled,
 };
 use crate::{Error, Result, shared::Slot};
 use ash::{ext::debug_utils, vk};
@@ -37,6 +38,8 @@ pub struct Device {
     pub(super) handles: Arc<Handles>,
     // Not in `Handles`: it holds buffers, which hold `Handles`.
     pub(super) staging: Arc<Mutex<Option<Staging>>>,
+    // As above.
+    pub(super) kernels: Arc<Mutex<Compiled>>,
 }
 
 impl fmt::Debug for Device {
@@ -77,7 +80,7 @@ impl Device {
         let candidates = instance.candidates()?;
         let chosen = choose(&candidates, options.device.as_deref())?;
         let handles = Handles::create(instance, chosen, options)?;
-        Ok(Device { handles: Arc::new(handles), staging: Arc::default() })
+        Ok(Device { handles: Arc::new(handles), staging: Arc::default(), kernels: Arc::default() })
     }
 
     /// Every Vulkan device of this machine, usable or not.

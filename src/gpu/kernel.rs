@@ -4,14 +4,14 @@ use super::{
     During,
     buffer::{Buffer, BufferMemory, Location},
     c_name,
-    device::{Device, Handles},
+    device::{Device, Handles, lock},
 };
 use crate::{
     Error, Result,
     shared::{Features, Slot, Step},
 };
 use ash::vk;
-use std::{ffi::CString, io::Cursor, sync::Arc};
+use std::{collections::HashMap, ffi::CString, io::Cursor, sync::Arc};
 
 /// Every slot of [`Slot::ALL`] as a storage buffer, and [`Step`] as push constants: the same for all kernels.
 #[derive(Clone)]
@@ -153,7 +153,11 @@ impl Drop for BindingsObjects {
     }
 }
 
-/// A compute pipeline, specialised to a scene's features.
+/// The kernels of [`Kernel::shared`], by SPIR-V, features and workgroup.
+pub(super) type Compiled = HashMap<(&'static [u8], Features, u32), Kernel>;
+
+/// A compute pipeline, specialised to a scene's features; clones share it.
+#[derive(Clone)]
 pub struct Kernel {
     pub(super) objects: Arc<KernelObjects>,
 }
@@ -220,6 +224,28 @@ impl Kernel {
         handles.name(pipeline, stem);
         let objects = KernelObjects { pipeline, stem, label: c_name(stem), workgroup, layout: layout.clone() };
         Ok(Kernel { objects: Arc::new(objects) })
+    }
+
+    /// As [`Kernel::new`], once for each device: whoever asks for the same again shares what was compiled. A device keeps
+    /// all that it compiled, a few hundred kilobytes each, as long as it lives.
+    ///
+    /// # Errors
+    /// As [`Kernel::new`].
+    pub fn shared(
+        device: &Device,
+        stem: &'static str,
+        spirv: &'static [u8],
+        features: &Features,
+        workgroup: u32,
+    ) -> Result<Kernel> {
+        let mut compiled = lock(&device.kernels);
+        let key = (spirv, *features, workgroup);
+        if let Some(kernel) = compiled.get(&key) {
+            return Ok(kernel.clone());
+        }
+        let kernel = Kernel::new(&Layout::new(device)?, stem, spirv, features, workgroup)?;
+        compiled.insert(key, kernel.clone());
+        Ok(kernel)
     }
 
     /// The name that it shares with its GLSL file and its twin.

@@ -125,7 +125,7 @@ impl Recorder {
         let rows = groups.div_ceil(self.handles.limits.max_compute_work_group_count[0]);
         let layout = kernel.objects.layout.objects.pipeline;
         let (device, commands) = (&self.handles.device, self.commands);
-        // SAFETY: the recording is open; kernel and bindings share one layout, are of this device and held.
+        // SAFETY: the recording is open; kernel and bindings have layouts of one definition, are of this device and held.
         unsafe {
             if let Some(functions) = &self.handles.debug_utils {
                 let label = vk::DebugUtilsLabelEXT::default().label_name(&kernel.objects.label);

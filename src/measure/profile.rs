@@ -99,7 +99,6 @@ fn radii(setup: &Setup, matter: &Matter) -> Result<Vec<f64>> {
     let prepared = prepare(&scene, &settings)?;
     let pixels = SIZE * SIZE;
     let device = setup.device;
-    let layout = Layout::new(device)?;
     let per_pixel = |slot: Slot, elements: u32| (slot, u64::from(elements) * slot.stride() as u64);
     let surfaces = per_pixel(Slot::Surfaces, pixels * BATCHES);
     let probes = per_pixel(Slot::Probes, pixels);
@@ -121,10 +120,10 @@ fn radii(setup: &Setup, matter: &Matter) -> Result<Vec<f64>> {
         buffers.push((slot, Buffer::new(device, slot.name(), bytes, Location::Device)?));
     }
     let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
-    let bindings = Bindings::new(&layout, &bound)?;
+    let bindings = Bindings::new(&Layout::new(device)?, &bound)?;
     let kernel = |stem: &'static str| {
         let (_, spirv) = SPIRV.iter().find(|(name, _)| *name == stem).expect("the kernel exists");
-        Kernel::new(&layout, stem, spirv, &prepared.features, settings.workgroup)
+        Kernel::shared(device, stem, spirv, &prepared.features, settings.workgroup)
     };
     let (primary, sample) = (kernel("primary")?, kernel("sample")?);
     let mut recorder = Recorder::new(device)?;

@@ -51,3 +51,20 @@ pub fn integrate(a: f64, b: f64, panels: usize, f: impl Fn(f64) -> f64) -> f64 {
     };
     (0..panels).map(panel).sum()
 }
+
+/// Where a function that falls from 1 at 0 has come down to `value`, to the last bit, by bisection: 0 for a value of 1 at
+/// least, `high` if it does not come down so far before.
+pub fn solve_falling(value: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, high);
+    if value >= 1.0 {
+        return low;
+    }
+    while high - low > 1e-16 * high {
+        let middle = (low + high) / 2.0;
+        if middle <= low || middle >= high {
+            break;
+        }
+        *(if f(middle) > value { &mut low } else { &mut high }) = middle;
+    }
+    high
+}

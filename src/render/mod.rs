@@ -34,10 +34,10 @@ macro_rules! kernels {
         struct Kernels { $($stem: Option<Kernel>,)* }
 
         impl Kernels {
-            fn new(layout: &Layout, prepared: &Prepared, workgroup: u32) -> Result<Kernels> {
+            fn new(device: &Device, prepared: &Prepared, workgroup: u32) -> Result<Kernels> {
                 Ok(Kernels { $($stem: match plan::needs(prepared, stringify!($stem)).0 {
-                    true => Some(Kernel::new(
-                        layout,
+                    true => Some(Kernel::shared(
+                        device,
                         stringify!($stem),
                         include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv")),
                         &prepared.features,
@@ -108,8 +108,7 @@ impl Renderer {
         if !(1..=128).contains(&settings.workgroup) {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
         }
-        let layout = Layout::new(device)?;
-        let kernels = Kernels::new(&layout, &prepared, settings.workgroup)?;
+        let kernels = Kernels::new(device, &prepared, settings.workgroup)?;
         let mut buffers = Vec::new();
         for (slot, data) in scene_data(scene, &prepared) {
             let limit = device.max_storage_buffer_range();
@@ -136,7 +135,7 @@ impl Renderer {
             upload(device, counters, bytemuck::bytes_of(&0u32))?;
         }
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
-        let bindings = Bindings::new(&layout, &bound)?;
+        let bindings = Bindings::new(&Layout::new(device)?, &bound)?;
         Ok(Renderer {
             device: device.clone(),
             frame: scene.frame,

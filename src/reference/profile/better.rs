@@ -34,6 +34,7 @@
 //! By t = sigma_tr z_r, which rises with b = t^2 / (3 - t^2) from 0 to sqrt(3/2).
 
 use super::super::boundary::{Side, moment};
+use super::super::math::solve_falling;
 use super::{COMPONENTS, Coefficients, Matter, Options, Radial, Source};
 use crate::scene::LengthKind;
 use crate::shared::Material;
@@ -189,20 +190,7 @@ impl Radial for BetterDipole {
 
 /// t = sigma_tr / sigma_t' of the matter with the given total (0 to 1) and index of refraction.
 ///
-/// 1 at least gives 0, 0 at most gives sqrt(3/2). The total of the result is
-/// within 1e-15 of the one asked for.
+/// 1 at least gives 0, 0 at most gives sqrt(3/2). The total of the result is within 1e-15 of the one asked for.
 pub fn invert_total(total: f64, ior: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 1.5f64.sqrt());
-    if total >= 1.0 {
-        return low;
-    }
-    while high - low > 1e-16 * high {
-        let middle = (low + high) / 2.0;
-        if middle <= low || middle >= high {
-            break;
-        }
-        let found = BetterDipole::new(middle * middle / (3.0 - middle * middle), 1.0, ior).total();
-        *(if found > total { &mut low } else { &mut high }) = middle;
-    }
-    high
+    solve_falling(total, 1.5f64.sqrt(), |t| BetterDipole::new(t * t / (3.0 - t * t), 1.0, ior).total())
 }

@@ -22,6 +22,7 @@
 //! where the total is close to 1: there 1 - alpha' is the square of 1 - total.
 
 use super::super::boundary::{Side, diffuse_reflectance};
+use super::super::math::solve_falling;
 use super::{COMPONENTS, Coefficients, Matter, Options, Radial, Source};
 use crate::shared::Material;
 
@@ -142,16 +143,5 @@ impl Radial for Dipole {
 pub fn invert_total(total: f64, ior: f64) -> f64 {
     let a = boundary_factor(ior);
     let of = |e: f64| (1.0 - e * e / 3.0) / 2.0 * (1.0 + (-4.0 / 3.0 * a * e).exp()) * (-e).exp();
-    let (mut low, mut high) = (0.0, 3f64.sqrt());
-    if total >= 1.0 {
-        return low;
-    }
-    while high - low > 1e-16 * high {
-        let middle = (low + high) / 2.0;
-        if middle <= low || middle >= high {
-            break;
-        }
-        *(if of(middle) > total { &mut low } else { &mut high }) = middle;
-    }
-    high
+    solve_falling(total, 3f64.sqrt(), of)
 }
