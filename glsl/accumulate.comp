@@ -63,7 +63,7 @@ void main() {
     if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));
-    uint batch = step_.sample_index % BATCHES;
+    uint batch = sample_index() % BATCHES;
 
     // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir).
     uint kept = min(count, MAX_HITS);
@@ -86,7 +86,7 @@ void main() {
         cumulative[j] = total;
     }
     if (!(total > 0.0)) return;
-    float threshold = unit(scramble(step_.point[DIM_HIT], dimension_key(key, batch, DIM_HIT))) * total;
+    float threshold = unit(scramble(sample_point(DIM_HIT), dimension_key(key, batch, DIM_HIT))) * total;
     uint chosen = 0;
     for (uint j = 1; j < kept; j++) {
         if (cumulative[j - 1] <= threshold && cumulative[j] > cumulative[j - 1]) chosen = j;
@@ -122,7 +122,7 @@ void main() {
             light = incoming.irradiance * max(dot(shading_n, direction), 0.0);
         } else if (EMISSIVE != 0 && k < first_direction) {
             uint j = k - view.light_count;
-            vec2 u = random_point(key, batch, DIM_EMITTER, step_.sample_index / BATCHES * view.directions + j);
+            vec2 u = random_point(key, batch, DIM_EMITTER, sample_index() / BATCHES * view.directions + j);
             EmitterPoint point = draw_emitter(view, position, n * SHADOW_OFFSET, u);
             direction = point.direction;
             distance = point.distance * EMITTER_REACH;
@@ -133,7 +133,7 @@ void main() {
                 direction, directional) * (c / float(view.directions));
         } else {
             uint j = k - first_direction;
-            vec2 u = random_point(key, batch, DIM_LIGHT, step_.sample_index / BATCHES * view.directions + j);
+            vec2 u = random_point(key, batch, DIM_LIGHT, sample_index() / BATCHES * view.directions + j);
             // The image and the cosine, half of the directions each, combined by the balance heuristic.
             bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
             if (image && u.x < 0.5) {

@@ -11,12 +11,15 @@ SURFACES(writeonly);
 void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
+    // A recording traces the strata of its first samples, whatever they are, and then each where it starts.
+    if (RECORDED != 0 && step_.pixel_centre == 0 && step_.sample_index >= BATCHES
+        && sample_index() / BATCHES % STRATUM != 0u) return;
     View view = views[0];
     uvec2 pixel = pixel_position(view, index);
     vec2 within = vec2(0.5);
     if (step_.pixel_centre == 0) {
-        uint stratum = step_.sample_index / BATCHES / STRATUM;
-        within = random_point(pixel_key(view.seed, pixel), step_.sample_index % BATCHES, DIM_PIXEL, stratum);
+        uint stratum = sample_index() / BATCHES / STRATUM;
+        within = random_point(pixel_key(view.seed, pixel), sample_index() % BATCHES, DIM_PIXEL, stratum);
     }
     vec2 ndc = 2.0 * (vec2(pixel) + within) / vec2(view.width, view.height) - 1.0;
     // The ray starts on the plane through the pivot, near the scene, so that a far eye costs no digits.

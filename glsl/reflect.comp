@@ -55,8 +55,8 @@ void main() {
     vec3 radiance = vec3(0.0);
     if (surface.triangle == MISS) {
         if (view.show_environment == 0 || step_.first == 0) return;
-        vec2 within = random_point(pixel_key(view.seed, pixel_position(view, index)), step_.sample_index % BATCHES,
-            DIM_PIXEL, step_.sample_index / BATCHES / STRATUM);
+        vec2 within = random_point(pixel_key(view.seed, pixel_position(view, index)), sample_index() % BATCHES,
+            DIM_PIXEL, sample_index() / BATCHES / STRATUM);
         vec2 ndc = 2.0 * (vec2(pixel_position(view, index)) + within) / vec2(view.width, view.height) - 1.0;
         vec3 to = view.forward + view.perspective * (ndc.x * view.right - ndc.y * view.up);
         radiance = environment_radiance(view, normalize(to));
@@ -94,16 +94,16 @@ void main() {
                 distance = incoming.distance;
                 light = incoming.irradiance;
             } else if (EMISSIVE != 0 && !direction_ray) {
-                vec2 u = random_point(key, step_.sample_index % BATCHES, DIM_EMITTER_REFLECT,
-                    step_.sample_index / BATCHES * view.directions + k - view.light_count);
+                vec2 u = random_point(key, sample_index() % BATCHES, DIM_EMITTER_REFLECT,
+                    sample_index() / BATCHES * view.directions + k - view.light_count);
                 point = draw_emitter(view, s.position, offset, u);
                 direction = point.direction;
                 distance = point.distance * EMITTER_REACH;
                 light = emitted(point.triangle, point.barycentric, direction);
             } else {
                 uint j = k - first_direction;
-                vec2 u = random_point(key, step_.sample_index % BATCHES, DIM_REFLECT,
-                    step_.sample_index / BATCHES * view.directions + j);
+                vec2 u = random_point(key, sample_index() % BATCHES, DIM_REFLECT,
+                    sample_index() / BATCHES * view.directions + j);
                 if (mirror) {
                     direction = frame * vec3(-wo.xy, wo.z);
                 } else if (u.x < shares.x) {

@@ -18,8 +18,8 @@ void main() {
     View view = views[0];
     bool has_probe = probe.t_min <= probe.t_max;
     uint set = has_probe ? triangles[surface.triangle].set : 0u;
-    uint key = dimension_key(pixel_key(view.seed, pixel_position(view, index)), step_.sample_index % BATCHES, DIM_OVERFLOW)
-        + hash(step_.sample_index / BATCHES);
+    uint key = dimension_key(pixel_key(view.seed, pixel_position(view, index)), sample_index() % BATCHES, DIM_OVERFLOW)
+        + hash(sample_index() / BATCHES);
     traverse(Ray(surface.position, probe.offset, probe.direction, probe.t_min, probe.t_max),
         PROJECTION == PROJECTION_CAMERA ? CLOSEST : ALL, set, key);
 

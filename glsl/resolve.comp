@@ -6,7 +6,9 @@
 #include "pixel.glsl"
 RUNNING_SUMS(readonly);
 BATCH_SUMS(readonly);
+PROGRESSES(readonly);
 PIXELS(writeonly);
+COLORS(writeonly);
 
 // Samples below `end` of batch `b`.
 uint samples_of_batch(uint b, uint end) {
@@ -17,6 +19,8 @@ void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
     Sums sums = running_sums[index];
+    uint begin = RECORDED != 0 ? progresses[0].begin : step_.range_begin;
+    uint end = RECORDED != 0 ? progresses[0].end : step_.range_end;
     Pixel pixel;
     float n = float(max(sums.samples, 1u));
     // Divided first: sum and carry together may exceed f32.
@@ -24,7 +28,7 @@ void main() {
     pixel.reflection = clamp_finite(max(sums.reflection / n + sums.reflection_carry / n, vec3(0.0)));
     pixel.variance = vec3(0.0);
     if (BATCHED != 0) {
-        float samples = max(float(step_.range_end - step_.range_begin), 1.0);
+        float samples = max(float(end - begin), 1.0);
         vec3 mean = vec3(0.0);
         for (uint b = 0; b < BATCHES; b++) mean += batch_sums[b * step_.pixel_count + index] / samples;
         // Relative to the largest deviation, whose square may exceed f32.
@@ -32,7 +36,7 @@ void main() {
         vec3 deviation[BATCHES];
         float n_b[BATCHES];
         for (uint b = 0; b < BATCHES; b++) {
-            n_b[b] = float(samples_of_batch(b, step_.range_end) - samples_of_batch(b, step_.range_begin));
+            n_b[b] = float(samples_of_batch(b, end) - samples_of_batch(b, begin));
             deviation[b] = batch_sums[b * step_.pixel_count + index] / max(n_b[b], 1.0) - mean;
             largest = max(largest, abs(deviation[b]));
         }
@@ -48,4 +52,5 @@ void main() {
     pixel.samples = sums.samples;
     pixel.invalid = sums.invalid;
     pixels[index] = pixel;
+    if (RECORDED != 0) colors[index] = vec4(clamp_finite(pixel.subsurface + pixel.reflection), pixel.alpha);
 }

@@ -32,9 +32,9 @@ void main() {
     View view = views[0];
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));
-    uint batch = step_.sample_index % BATCHES;
+    uint batch = sample_index() % BATCHES;
     float u[4];
-    for (uint i = 0; i < 4; i++) u[i] = unit(scramble(step_.point[i], dimension_key(key, batch, i)));
+    for (uint i = 0; i < 4; i++) u[i] = unit(scramble(sample_point(i), dimension_key(key, batch, i)));
 
     vec4 fractions = technique_fractions(dot(s.wo, s.normal));
     float u_technique = u[DIM_TECHNIQUE];

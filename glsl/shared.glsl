@@ -10,6 +10,10 @@ const uint WORKGROUP = 64u;
 const uint BATCHES = 8u;
 // Consecutive samples of one batch that share a sub-pixel stratum, and so a G-buffer.
 const uint STRATUM = 4u;
+// Most samples of one recording into a caller's command buffer.
+const uint MAX_RECORDED = 4096u;
+// Value of `Progress::end` where the sums are to be forgotten.
+const uint NO_SAMPLES = 4294967295u;
 // Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
 const uint MAX_HITS = 8u;
 // Most lights of one dispatch of `single`, which takes two rays to each and one more.
@@ -151,6 +155,8 @@ layout(constant_id = 7) const uint TEXTURED = 0;
 layout(constant_id = 5) const uint MODELS = 0;
 // 1 where profiles depend on the curvature of the surface that is seen.
 layout(constant_id = 10) const uint CURVATURE = 0;
+// 1 where a caller's recordings keep count of the samples on the device.
+layout(constant_id = 20) const uint RECORDED = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -204,7 +210,8 @@ struct Step {
     uint first_row;
     // Pixels in the band.
     uint pixel_count;
-    // Index of the sample: number sample_index / BATCHES of batch sample_index % BATCHES.
+    // Index of the sample: number sample_index / BATCHES of batch sample_index % BATCHES. In a recording, the sample's
+    // position in it; for `begin`, the start of the recording's range.
     uint sample_index;
     // 1 to trace `primary` through the pixel's centre, for the AOVs.
     uint pixel_centre;
@@ -221,6 +228,26 @@ struct Step {
     // End of that range.
     uint range_end;
     // The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
+    uint point[5];
+};
+
+// Which samples the sums hold, where recordings keep count of them (`RECORDED`).
+struct Progress {
+    // Added to the range of every recording.
+    uint first;
+    // First sample of the sums.
+    uint begin;
+    // End of the samples of the sums; NO_SAMPLES where they are to be forgotten.
+    uint end;
+    // 1 where the recording that runs started new sums.
+    uint restart;
+};
+
+// A sample of the recording that runs, written by `begin`.
+struct Sample {
+    // As `Step::sample_index` without recordings.
+    uint index;
+    // As `Step::point` without recordings.
     uint point[5];
 };
 
@@ -472,5 +499,11 @@ struct Pixel {
 #define THICKNESS(access) layout(set = 0, binding = 21, scalar) access buffer ThicknessBlock { vec3 thickness[]; }
 // BOUNDARY_NODES values of the transmittance of each rough boundary.
 #define BOUNDARIES(access) layout(set = 0, binding = 22, scalar) access buffer BoundariesBlock { float boundaries[]; }
+// One Progress.
+#define PROGRESSES(access) layout(set = 0, binding = 23, scalar) access buffer ProgressesBlock { Progress progresses[]; }
+// MAX_RECORDED samples, of which a recording uses the first.
+#define SAMPLES(access) layout(set = 0, binding = 24, scalar) access buffer SamplesBlock { Sample samples[]; }
+// Light (R, G, B) and alpha of each pixel, row by row from the upper left.
+#define COLORS(access) layout(set = 0, binding = 25, scalar) access buffer ColorsBlock { vec4 colors[]; }
 
 layout(push_constant, scalar) uniform StepBlock { Step step_; };

@@ -61,9 +61,9 @@ void main() {
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint set = triangles[surface.triangle].set;
     uint key = pixel_key(view.seed, pixel_position(view, index));
-    uint batch = step_.sample_index % BATCHES;
-    vec2 u = vec2(unit(scramble(step_.point[0], dimension_key(key, batch, DIM_SINGLE))),
-        unit(scramble(step_.point[1], dimension_key(key, batch, DIM_SINGLE + 1u))));
+    uint batch = sample_index() % BATCHES;
+    vec2 u = vec2(unit(scramble(sample_point(0), dimension_key(key, batch, DIM_SINGLE))),
+        unit(scramble(sample_point(1), dimension_key(key, batch, DIM_SINGLE + 1u))));
     // Channels that scatter, equally probable.
     vec3 chances = vec3(greaterThan(m.scattering, vec3(0.0)));
     chances /= chances.x + chances.y + chances.z;
@@ -115,7 +115,7 @@ void main() {
                 light = incoming.irradiance;
             } else if (EMISSIVE != 0 && k < first_direction) {
                 vec2 v = random_point(key, batch, DIM_SINGLE_EMITTER,
-                    step_.sample_index / BATCHES * view.directions + (k - view.light_count));
+                    sample_index() / BATCHES * view.directions + (k - view.light_count));
                 EmitterPoint point = draw_emitter(view, s.position, depth * d, v);
                 direction = point.direction;
                 distance = point.distance * EMITTER_REACH;
@@ -124,7 +124,7 @@ void main() {
                     direction, direction_density(view, m, chances, d, n, direction)) / float(view.directions);
             } else {
                 vec2 v = random_point(key, batch, DIM_SINGLE_LIGHT,
-                    step_.sample_index / BATCHES * view.directions + (k - first_direction));
+                    sample_index() / BATCHES * view.directions + (k - first_direction));
                 bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
                 if (image && v.x < 0.5) {
                     direction = draw_environment(view, vec2(2.0 * v.x, v.y));

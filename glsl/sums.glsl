@@ -29,7 +29,7 @@ bool addable(vec3 radiance, vec3 sum) {
 // Adds light that passed through matter to the sums of the pixel and, where they are kept, of the sample's batch.
 void add_subsurface(uint index, vec3 radiance) {
     vec3 sum = running_sums[index].subsurface, carry = running_sums[index].subsurface_carry;
-    uint batch_index = step_.sample_index % BATCHES * step_.pixel_count + index;
+    uint batch_index = sample_index() % BATCHES * step_.pixel_count + index;
     vec3 batch_sum = vec3(0.0);
     if (BATCHED != 0) batch_sum = batch_sums[batch_index];
     // The batch's sum rounds otherwise, so that it may overflow alone.

@@ -50,6 +50,10 @@
 //! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
 //! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups.
 //!
+//! *Recordings.* [`Renderer::record`] puts the same dispatches into a command buffer of the caller's, on a device of the
+//! caller's ([`Device::from_raw`]). There `begin` numbers the samples and `clear` forgets the sums if they do not go on, so
+//! what the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
+//!
 //! # What may use what
 //!
 //! | module | may use | holds |
@@ -59,7 +63,7 @@
 //! | [`settings`] | `shared` | [`Settings`]: what a caller may choose |
 //! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
-//! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
+//! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; no scenes; unsafe code is denied elsewhere, but for `record`'s own signature |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
 //! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like |
@@ -74,10 +78,13 @@
 //!
 //! The program uses this public interface alone. There is no global state: devices and renderers stand side by side.
 
+#![deny(unsafe_code)]
+
 pub mod curvature;
 pub mod error;
 #[doc = include_str!("docs/extremes.md")]
 pub mod extremes {}
+#[allow(unsafe_code, reason = "the layer over Vulkan")]
 pub mod gpu;
 pub mod image;
 pub mod inspect;
@@ -92,6 +99,7 @@ pub mod settings;
 pub mod shared;
 pub mod table;
 
+pub use ash;
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use image::Image;

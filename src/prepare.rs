@@ -197,6 +197,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         textures: kinds,
         rough: u32::from(!boundaries.nodes.is_empty()),
         curvature: u32::from(!thickness.is_empty()),
+        recorded: u32::from(settings.recording),
         ..Features::default()
     };
     Ok(Prepared {
@@ -237,7 +238,7 @@ fn footprint(camera: &Camera, frame: Frame, height: u32) -> f64 {
 }
 
 /// The camera's part of a View, in internal units.
-fn view_of(camera: &Camera, frame: Frame, width: u32, height: u32) -> View {
+pub(crate) fn view_of(camera: &Camera, frame: Frame, width: u32, height: u32) -> View {
     let eye = (camera.eye - frame.centre) * frame.scale;
     // Rays start on a plane near the scene, so that a far eye costs no digits; a near eye needs no such plane.
     let depth = (-eye).dot(camera.forward).max(1.0);
@@ -259,7 +260,8 @@ fn view_of(camera: &Camera, frame: Frame, width: u32, height: u32) -> View {
     }
 }
 
-fn delta_light(light: &crate::scene::Light, frame: Frame) -> Light {
+/// A light in internal units.
+pub(crate) fn delta_light(light: &crate::scene::Light, frame: Frame) -> Light {
     let mut out = Light {
         position: ((light.position - frame.centre) * frame.scale).as_vec3(),
         direction: light.direction.as_vec3(),
@@ -341,6 +343,52 @@ fn materials(
         }
     }
     Ok(out)
+}
+
+/// The material number `index` with other parameters, where the same kernels and buffers do for it.
+pub(crate) fn replaced(
+    prepared: &Prepared,
+    settings: &Settings,
+    frame: Frame,
+    index: usize,
+    old: &scene::Material,
+    new: &scene::Material,
+) -> Result<Material> {
+    let refuse = |problem: &str| Err(Error::setting(format!("material `{}`", new.name), problem.to_string()));
+    let of = |m: &scene::Material| (m.medium.is_some(), m.two_sided, m.hidden, m.tinted, m.set.clone(), m.emission);
+    let unit = |v: DVec3| v.is_finite() && v.min_element() >= 0.0 && v.max_element() <= 1.0;
+    let numbers = new.medium.as_ref().is_none_or(|m| {
+        let positive = |v: DVec3| v.is_finite() && v.min_element() >= 0.0;
+        positive(m.sigma_s_prime) && positive(m.sigma_a) && m.g.is_finite() && m.g.abs().max_element() < 1.0
+    });
+    let fraction = |x: f64| (0.0..=1.0).contains(&x);
+    let surface = unit(new.base_color) && fraction(new.metallic) && fraction(new.roughness);
+    if !(numbers && surface && (0.1..=10.0).contains(&new.ior)) {
+        return refuse("a number is out of its range");
+    }
+    let advice = prepared.advice[index].as_ref();
+    let model = advice.map_or(settings.model, |advice| advice.choice.model);
+    let translucent = new.medium.is_some();
+    if of(old) != of(new) || old.textures != new.textures || !old.ramp.is_empty() {
+        return refuse("another kind of matter, emission, texture or set needs a new renderer");
+    }
+    if translucent && model == Model::Table {
+        return refuse("the table model's profile is simulated for its matter; another needs a new renderer");
+    }
+    let same_boundary = old.roughness == new.roughness && (old.ior == new.ior || old.roughness == 0.0);
+    if translucent && !same_boundary || (old.roughness > 0.0) != (new.roughness > 0.0) {
+        return refuse("another rough boundary needs a new renderer");
+    }
+    let settings = Settings { model, ..settings.clone() };
+    let mut boundaries = Boundaries::default();
+    let mut made = material(new, frame, &settings, &[], &mut vec![], &mut boundaries)?;
+    // The same roughness and index have the same table.
+    let before = &prepared.materials[index];
+    made.boundary = before.boundary;
+    if made.scattering != Vec3::ZERO && !prepared.has_single {
+        return refuse("light scattered once needs a new renderer");
+    }
+    Ok(made)
 }
 
 /// Totals along a ramp over that at its end. A tabulated profile keeps its shape there: one for each share of the colour

@@ -171,6 +171,9 @@ pub struct Settings {
     /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows. Without it 2^18, or
     /// what the device's bindings and memory allow. The image does not depend on it.
     pub band_pixels: Option<u32>,
+    /// Makes what [`Renderer::record`](crate::Renderer::record) needs: one band, whatever `band_pixels` says, colours in a
+    /// buffer of their own, and the count of samples on the device. The image does not depend on it.
+    pub recording: bool,
     /// Invocations of a workgroup, 1 to 128; the image does not depend on it.
     pub workgroup: u32,
 }
@@ -193,6 +196,7 @@ impl Default for Settings {
             variance: true,
             radius_tail: 1e-6,
             band_pixels: None,
+            recording: false,
             workgroup: shared::WORKGROUP,
         }
     }

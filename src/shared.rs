@@ -9,7 +9,7 @@
 //! Rec.709.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{UVec4, Vec2, Vec3};
+use glam::{UVec4, Vec2, Vec3, Vec4};
 
 /// A type that has the same bytes in Rust (`repr(C)`) and in GLSL (`scalar` layout).
 pub trait Glsl {
@@ -26,7 +26,7 @@ macro_rules! glsl_types {
         }
     )*};
 }
-glsl_types!(f32 => "float", u32 => "uint", Vec2 => "vec2", Vec3 => "vec3", UVec4 => "uvec4");
+glsl_types!(f32 => "float", u32 => "uint", Vec2 => "vec2", Vec3 => "vec3", Vec4 => "vec4", UVec4 => "uvec4");
 
 impl<T: Glsl, const N: usize> Glsl for [T; N] {
     fn declare(name: &str) -> String {
@@ -174,6 +174,10 @@ constants! {
     BATCHES: u32 = 8;
     /// Consecutive samples of one batch that share a sub-pixel stratum, and so a G-buffer.
     STRATUM: u32 = 4;
+    /// Most samples of one recording into a caller's command buffer.
+    MAX_RECORDED: u32 = 4096;
+    /// Value of `Progress::end` where the sums are to be forgotten.
+    NO_SAMPLES: u32 = 0xffffffffu32;
     /// Most hits that a probe keeps; of more, this many are kept uniformly at random and reweighted.
     MAX_HITS: u32 = 8;
     /// Most lights of one dispatch of `single`, which takes two rays to each and one more.
@@ -359,7 +363,8 @@ structs! {
         first_row: u32,
         /// Pixels in the band.
         pixel_count: u32,
-        /// Index of the sample: number sample_index / BATCHES of batch sample_index % BATCHES.
+        /// Index of the sample: number sample_index / BATCHES of batch sample_index % BATCHES. In a recording, the sample's
+        /// position in it; for `begin`, the start of the recording's range.
         sample_index: u32,
         /// 1 to trace `primary` through the pixel's centre, for the AOVs.
         pixel_centre: u32,
@@ -376,6 +381,26 @@ structs! {
         /// End of that range.
         range_end: u32,
         /// The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
+        point: [u32; 5],
+    }
+
+    /// Which samples the sums hold, where recordings keep count of them (`RECORDED`).
+    struct Progress {
+        /// Added to the range of every recording.
+        first: u32,
+        /// First sample of the sums.
+        begin: u32,
+        /// End of the samples of the sums; NO_SAMPLES where they are to be forgotten.
+        end: u32,
+        /// 1 where the recording that runs started new sums.
+        restart: u32,
+    }
+
+    /// A sample of the recording that runs, written by `begin`.
+    struct Sample {
+        /// As `Step::sample_index` without recordings.
+        index: u32,
+        /// As `Step::point` without recordings.
         point: [u32; 5],
     }
 
@@ -629,6 +654,12 @@ buffers! {
     Thickness = 21: THICKNESS [Vec3] thickness;
     /// BOUNDARY_NODES values of the transmittance of each rough boundary.
     Boundaries = 22: BOUNDARIES [f32] boundaries;
+    /// One Progress.
+    Progresses = 23: PROGRESSES [Progress] progresses;
+    /// MAX_RECORDED samples, of which a recording uses the first.
+    Samples = 24: SAMPLES [Sample] samples;
+    /// Light (R, G, B) and alpha of each pixel, row by row from the upper left.
+    Colors = 25: COLORS [Vec4] colors;
 }
 
 features! {
@@ -650,6 +681,8 @@ features! {
     models = 5: MODELS,
     /// 1 where profiles depend on the curvature of the surface that is seen.
     curvature = 10: CURVATURE,
+    /// 1 where a caller's recordings keep count of the samples on the device.
+    recorded = 20: RECORDED,
 }
 
 impl Features {

@@ -3,11 +3,11 @@
 use super::{
     During, Recorder,
     device::{Device, Handles, lock},
+    memory::{Allocation, MemoryRequest},
 };
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
-use gpu_allocator::{MemoryLocation, vulkan as memory};
 use std::{cell::Cell, marker::PhantomData, ptr::NonNull, sync::Arc};
 
 /// Bytes of a staging buffer; larger transfers go in pieces.
@@ -16,9 +16,12 @@ const STAGING_BYTES: u64 = 8 << 20;
 /// Where a buffer's memory is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Location {
-    /// On the device; filled by [`upload`], read by [`download`].
+    /// On the device; filled by [`upload`], read by [`download`]. On a device without a queue, which cannot fill it
+    /// otherwise, where the host reaches it.
     Device,
-    /// On the host, for [`Buffer::write`].
+    /// On the device; kernels alone write it.
+    Scratch,
+    /// Where both reach it, for [`Buffer::write`].
     Upload,
     /// On the host, for [`Buffer::read`].
     Readback,
@@ -37,9 +40,18 @@ pub(super) struct BufferMemory {
     pub raw: vk::Buffer,
     pub bytes: u64,
     handles: Arc<Handles>,
-    // None only while making and dropping.
-    allocation: Option<memory::Allocation>,
+    origin: Origin,
     mapped: Option<NonNull<u8>>,
+}
+
+/// Where a buffer and its memory come from, and so what is destroyed with it.
+enum Origin {
+    /// Both are ours. None only while making and dropping.
+    Own(Option<Allocation>),
+    /// The buffer and the handle of its memory are ours, the bytes the caller's.
+    HostImport(vk::DeviceMemory),
+    /// Both are the caller's.
+    Caller,
 }
 
 // SAFETY: `mapped` points into memory that this value owns; only the one `Buffer` follows it, which is not `Sync`.
@@ -64,44 +76,128 @@ impl Buffer {
 
     pub(super) fn with_handles(handles: &Arc<Handles>, name: &str, bytes: u64, location: Location) -> Result<Buffer> {
         let step = format!("create buffer `{name}`");
-        let problem =
-            |error: gpu_allocator::AllocationError| Error::Memory { step: step.clone(), problem: error.to_string() };
+        // What cannot be staged is written where it is.
+        let location = match location {
+            Location::Device if handles.queue.is_none() => Location::Upload,
+            other => other,
+        };
         let bytes = bytes.max(4);
         let device = &handles.device;
         // SAFETY: the device is alive and the size is within its limits.
         let raw = unsafe { device.create_buffer(&create_info(bytes), None) }.during(&step)?;
         handles.name(raw, name);
         // From here on dropping it destroys the buffer.
-        let mut owner = BufferMemory { raw, bytes, handles: handles.clone(), allocation: None, mapped: None };
+        let mut owner = BufferMemory { raw, bytes, handles: handles.clone(), origin: Origin::Own(None), mapped: None };
         // SAFETY: the buffer is of this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(raw) };
-        let description = memory::AllocationCreateDesc {
-            name,
-            requirements,
-            location: match location {
-                Location::Device => MemoryLocation::GpuOnly,
-                Location::Upload => MemoryLocation::CpuToGpu,
-                Location::Readback => MemoryLocation::GpuToCpu,
-            },
-            linear: true,
-            allocation_scheme: memory::AllocationScheme::GpuAllocatorManaged,
-        };
-        let allocation = handles.with_allocator(|allocator| allocator.allocate(&description)).map_err(problem)?;
+        let request = MemoryRequest { name, requirements, location };
+        let allocation = handles.allocate(&request).map_err(|problem| Error::Memory { step: step.clone(), problem })?;
         // SAFETY: the allocation is alive and owned by the same value as the buffer; its offset is within it.
-        let bound = unsafe { device.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) };
-        let flags = allocation.memory_properties();
+        let bound = unsafe { device.bind_buffer_memory(raw, allocation.memory, allocation.offset) };
+        let flags = allocation.properties;
         // The device's memory is touched directly only where the host caches it: over a bus, reads would crawl.
         let direct = match location {
-            Location::Device => {
+            Location::Device | Location::Scratch => {
                 flags.contains(vk::MemoryPropertyFlags::HOST_COHERENT | vk::MemoryPropertyFlags::HOST_CACHED)
                     && !handles.force_staging
             }
             Location::Upload | Location::Readback => true,
         };
-        owner.mapped = allocation.mapped_ptr().filter(|_| direct).map(NonNull::cast);
-        owner.allocation = Some(allocation);
-        bound.during(step)?;
+        owner.mapped = allocation.mapped.filter(|_| direct);
+        owner.origin = Origin::Own(Some(allocation));
+        bound.during(&step)?;
+        if matches!(location, Location::Upload | Location::Readback) && owner.mapped.is_none() {
+            return Err(Error::Memory { step, problem: "the allocator's memory is not mapped".into() });
+        }
         Ok(Buffer { memory: Arc::new(owner), one_thread: PhantomData })
+    }
+
+    /// The first `bytes` of a caller's buffer, which is not destroyed with this value.
+    ///
+    /// # Safety
+    /// The buffer is of this device, bound to memory, was made with the usages STORAGE_BUFFER, TRANSFER_SRC and
+    /// TRANSFER_DST and at least that many bytes, and outlives this value and all bindings and recordings that use it.
+    pub unsafe fn of_caller(device: &Device, raw: vk::Buffer, bytes: u64) -> Buffer {
+        let handles = device.handles.clone();
+        Buffer {
+            memory: Arc::new(BufferMemory { raw, bytes, handles, origin: Origin::Caller, mapped: None }),
+            one_thread: PhantomData,
+        }
+    }
+
+    /// A buffer whose memory is the caller's own: the device reads and writes it in place.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where VK_EXT_external_memory_host is not enabled; [`Error::Memory`] for an address or size that
+    /// is no multiple of [`Device::host_import_alignment`], or memory that the device cannot import; [`Error::Vulkan`].
+    ///
+    /// # Safety
+    /// The memory is valid for reads and writes and outlives this value and all bindings and recordings that use it.
+    /// While one of those executes, and while a method of this value runs, nobody else touches it.
+    pub unsafe fn import_host(device: &Device, name: &str, start: NonNull<u8>, bytes: u64) -> Result<Buffer> {
+        let handles = &device.handles;
+        let step = format!("import host memory as buffer `{name}`");
+        let Some(host) = &handles.host_memory else {
+            return Err(Error::Device(format!("{step}: VK_EXT_external_memory_host is not enabled")));
+        };
+        let memory = |problem: String| Error::Memory { step: step.clone(), problem };
+        let address = start.as_ptr() as u64;
+        if bytes == 0 || bytes % host.alignment != 0 || address % host.alignment != 0 {
+            let problem = format!("{bytes} bytes at {address:#x} are not a multiple of {}", host.alignment);
+            return Err(memory(problem));
+        }
+        let limit = device.max_storage_buffer_range();
+        if bytes > limit {
+            return Err(memory(format!("{bytes} bytes; the device's buffers hold at most {limit}")));
+        }
+        let kind = vk::ExternalMemoryHandleTypeFlags::HOST_ALLOCATION_EXT;
+        let mut external = vk::ExternalMemoryBufferCreateInfo::default().handle_types(kind);
+        let create = create_info(bytes).push_next(&mut external);
+        // SAFETY: the device is alive and the size within its limits.
+        let raw = unsafe { handles.device.create_buffer(&create, None) }.during(&step)?;
+        handles.name(raw, name);
+        // From here on dropping it destroys the buffer.
+        let mut owner =
+            BufferMemory { raw, bytes, handles: handles.clone(), origin: Origin::Own(None), mapped: Some(start) };
+        let mut properties = vk::MemoryHostPointerPropertiesEXT::default();
+        // SAFETY: the buffer is of this device; the extension is enabled and the caller's memory is valid.
+        let requirements = unsafe {
+            let requirements = handles.device.get_buffer_memory_requirements(raw);
+            (host.functions.fp().get_memory_host_pointer_properties_ext)(
+                handles.device.handle(),
+                kind,
+                start.as_ptr().cast(),
+                &mut properties,
+            )
+            .result()
+            .during(&step)?;
+            requirements
+        };
+        let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+        let allowed = requirements.memory_type_bits & properties.memory_type_bits;
+        let types = host.types.memory_types_as_slice();
+        let index = (0..types.len()).find(|&i| allowed & (1 << i) != 0 && types[i].property_flags.contains(wanted));
+        let Some(index) = index.filter(|_| requirements.size <= bytes) else {
+            return Err(memory("the device has no memory type for it".into()));
+        };
+        let mut import = vk::ImportMemoryHostPointerInfoEXT::default().handle_type(kind);
+        import.p_host_pointer = start.as_ptr().cast();
+        let allocate = vk::MemoryAllocateInfo::default()
+            .allocation_size(bytes)
+            .memory_type_index(index as u32)
+            .push_next(&mut import);
+        // SAFETY: address and size are aligned and the memory is valid, as the caller promises.
+        unsafe {
+            let imported = handles.device.allocate_memory(&allocate, None).during(&step)?;
+            owner.origin = Origin::HostImport(imported);
+            handles.device.bind_buffer_memory(raw, imported, 0).during(&step)?;
+        }
+        Ok(Buffer { memory: Arc::new(owner), one_thread: PhantomData })
+    }
+
+    /// Vulkan's handle, for commands of the caller's; valid as long as this value.
+    pub fn raw(&self) -> vk::Buffer {
+        self.memory.raw
     }
 
     /// Size in bytes.
@@ -157,11 +253,17 @@ impl BufferMemory {
 
 impl Drop for BufferMemory {
     fn drop(&mut self) {
+        if matches!(self.origin, Origin::Caller) {
+            return;
+        }
+        let device = &self.handles.device;
         // SAFETY: no bindings or recordings hold it any more, and it is of this device.
-        unsafe { self.handles.device.destroy_buffer(self.raw, None) };
-        if let Some(allocation) = self.allocation.take() {
-            let freed = self.handles.with_allocator(|allocator| allocator.free(allocation));
-            debug_assert!(freed.is_ok(), "an allocation is freed once");
+        unsafe { device.destroy_buffer(self.raw, None) };
+        match &mut self.origin {
+            Origin::Own(allocation) => allocation.take().into_iter().for_each(|given| self.handles.free(given)),
+            // SAFETY: only that buffer used it.
+            Origin::HostImport(memory) => unsafe { device.free_memory(*memory, None) },
+            Origin::Caller => {}
         }
     }
 }

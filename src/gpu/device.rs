@@ -1,14 +1,19 @@
-//! The device: chosen, opened, and what everything else of this module holds on to.
+//! The device: chosen and opened, or a caller's; and what everything else of this module holds on to.
 
 use super::{
     During,
     buffer::Staging,
     c_name,
-    instance::{Candidate, DeviceInfo, Instance, ValidationLog},
+    instance::{Candidate, DeviceInfo, Instance, ValidationLog, describe},
     kernel::Compiled,
+    memory::{Allocation, Allocator, MemoryRequest},
+    requirements::{self, Requirements},
 };
 use crate::{Error, Result, shared::Slot};
-use ash::{ext::debug_utils, vk};
+use ash::{
+    ext::{debug_utils, external_memory_host},
+    vk,
+};
 use gpu_allocator::{AllocationSizes, vulkan as memory};
 use std::{
     fmt,
@@ -32,7 +37,70 @@ pub struct DeviceOptions {
     pub buffer_bytes: Option<u64>,
 }
 
-/// A handle of an open device; clones share it. What is made from a device keeps it alive.
+/// A Vulkan device that a caller made and keeps, for [`Device::from_raw`].
+pub struct RawDevice<'a> {
+    pub instance: ash::Instance,
+    pub physical: vk::PhysicalDevice,
+    pub device: ash::Device,
+    /// A family with compute, whose queues run what is recorded.
+    pub queue_family: u32,
+    /// A queue of that family, to which [`Renderer::new`](crate::Renderer::new), `render` and `image` submit; recordings
+    /// never do. Without one, buffers that the host fills are in memory that it reaches, and `render` is an error.
+    pub queue: Option<vk::Queue>,
+    /// What the device was made with, so that a missing feature is an error that names it and VK_EXT_external_memory_host
+    /// is used where it is enabled; without it the caller is trusted and the extension not used.
+    pub created_with: Option<&'a vk::DeviceCreateInfo<'a>>,
+    /// VK_EXT_debug_utils is enabled in the instance: objects get names and dispatches labels.
+    pub debug_utils: bool,
+    /// Where device memory comes from; without it an allocator of our own.
+    pub allocator: Option<Arc<dyn Allocator>>,
+    /// Used for every pipeline; may be null.
+    pub pipeline_cache: vk::PipelineCache,
+}
+
+impl<'a> RawDevice<'a> {
+    /// These handles, with no queue, no allocator and no pipeline cache.
+    pub fn new(
+        instance: ash::Instance,
+        physical: vk::PhysicalDevice,
+        device: ash::Device,
+        queue_family: u32,
+    ) -> RawDevice<'a> {
+        RawDevice {
+            instance,
+            physical,
+            device,
+            queue_family,
+            queue: None,
+            created_with: None,
+            debug_utils: false,
+            allocator: None,
+            pipeline_cache: vk::PipelineCache::null(),
+        }
+    }
+
+    /// As [`RawDevice::new`], from Vulkan's own handles.
+    ///
+    /// # Safety
+    /// The handles are alive and belong together, and the function is that of their loader.
+    pub unsafe fn load(
+        get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
+        instance: vk::Instance,
+        physical: vk::PhysicalDevice,
+        device: vk::Device,
+        queue_family: u32,
+    ) -> RawDevice<'a> {
+        // SAFETY: as the caller promises.
+        unsafe {
+            let instance = ash::Instance::load(&ash::StaticFn { get_instance_proc_addr }, instance);
+            let device = ash::Device::load(instance.fp_v1_0(), device);
+            RawDevice::new(instance, physical, device, queue_family)
+        }
+    }
+}
+
+/// A handle of an open device; clones share it. What is made from a device keeps it alive. It may be used from several
+/// threads at once.
 #[derive(Clone)]
 pub struct Device {
     pub(super) handles: Arc<Handles>,
@@ -48,13 +116,15 @@ impl fmt::Debug for Device {
     }
 }
 
-/// The Vulkan objects of an open device, destroyed when the last user drops.
+/// The Vulkan objects of an open device, destroyed when the last user drops; a caller's are left alone.
 pub(super) struct Handles {
     pub device: ash::Device,
-    /// Submissions to a queue must not overlap.
-    pub queue: Mutex<vk::Queue>,
+    /// Submissions to a queue must not overlap. None for a caller's device without one.
+    pub queue: Option<Mutex<vk::Queue>>,
     pub family: u32,
     pub debug_utils: Option<debug_utils::Device>,
+    pub host_memory: Option<HostMemory>,
+    pub pipeline_cache: vk::PipelineCache,
     pub info: DeviceInfo,
     pub limits: vk::PhysicalDeviceLimits,
     /// 0 where the queue has no timestamps.
@@ -63,9 +133,31 @@ pub(super) struct Handles {
     max_buffer_bytes: u64,
     heap_bytes: u64,
     // None only while opening and dropping.
-    allocator: Mutex<Option<memory::Allocator>>,
+    allocator: Option<Arc<dyn Allocator>>,
     // The instance if it and the device are ours to destroy; none for a caller's device.
     owned: Option<Instance>,
+    log: ValidationLog,
+}
+
+/// VK_EXT_external_memory_host.
+pub(super) struct HostMemory {
+    pub functions: external_memory_host::Device,
+    /// Alignment of address and size (bytes).
+    pub alignment: u64,
+    pub types: vk::PhysicalDeviceMemoryProperties,
+}
+
+/// What `Handles` are made of, but for who owns it.
+struct Parts<'a> {
+    instance: &'a ash::Instance,
+    physical: vk::PhysicalDevice,
+    device: ash::Device,
+    queue: Option<vk::Queue>,
+    family: u32,
+    info: DeviceInfo,
+    debug_utils: bool,
+    host_import: bool,
+    pipeline_cache: vk::PipelineCache,
     log: ValidationLog,
 }
 
@@ -81,6 +173,63 @@ impl Device {
         let chosen = choose(&candidates, options.device.as_deref())?;
         let handles = Handles::create(instance, chosen, options)?;
         Ok(Device { handles: Arc::new(handles), staging: Arc::default(), kernels: Arc::default() })
+    }
+
+    /// A device that the caller made. Instance and device are not destroyed with it; they must outlive it and all that
+    /// is made from it.
+    ///
+    /// # Errors
+    /// [`Error::Device`] with what the physical device lacks, or what instance or device were made without (see
+    /// [`Requirements`]); [`Error::Memory`] if the allocator cannot start.
+    ///
+    /// # Safety
+    /// The handles are alive and belong together. Without `created_with` the features of [`Requirements`] are enabled.
+    /// While a method of this crate runs that submits (those that the documentation of `RawDevice::queue` names), nobody
+    /// else uses the queue.
+    pub unsafe fn from_raw(raw: RawDevice) -> Result<Device> {
+        requirements::check_version(&raw.instance, &raw.device, raw.physical)?;
+        let info = describe(&raw.instance, 0, raw.physical).info;
+        if !info.lacks.is_empty() {
+            return Err(Error::Device(info.to_string()));
+        }
+        // SAFETY: the caller's handles are alive and belong together.
+        let families = unsafe { raw.instance.get_physical_device_queue_family_properties(raw.physical) };
+        match families.get(raw.queue_family as usize) {
+            Some(family) if family.queue_flags.contains(vk::QueueFlags::COMPUTE) => {}
+            _ => return Err(Error::Device(format!("queue family {} has no compute", raw.queue_family))),
+        }
+        let host_import = match raw.created_with {
+            // SAFETY: a reference to Vulkan's structure promises valid pointers.
+            Some(create) => unsafe { requirements::check(create, raw.queue_family) }?.host_import,
+            None => false,
+        };
+        let mut handles = Handles::new(Parts {
+            instance: &raw.instance,
+            physical: raw.physical,
+            device: raw.device,
+            queue: raw.queue,
+            family: raw.queue_family,
+            info,
+            debug_utils: raw.debug_utils,
+            host_import,
+            pipeline_cache: raw.pipeline_cache,
+            log: ValidationLog::default(),
+        });
+        handles.allocator = Some(match raw.allocator {
+            Some(allocator) => allocator,
+            None => own_allocator(&raw.instance, raw.physical, &handles.device)?,
+        });
+        Ok(Device { handles: Arc::new(handles), staging: Arc::default(), kernels: Arc::default() })
+    }
+
+    /// Whether there is a queue to which `render`, uploads and downloads can be submitted.
+    pub fn has_queue(&self) -> bool {
+        self.handles.queue.is_some()
+    }
+
+    /// Whether timestamps can be written on its queue family.
+    pub fn has_timestamps(&self) -> bool {
+        self.handles.timestamp_bits > 0
     }
 
     /// Every Vulkan device of this machine, usable or not.
@@ -107,6 +256,12 @@ impl Device {
         self.handles.heap_bytes
     }
 
+    /// Of which number (bytes) address and size of memory for [`Buffer::import_host`](super::Buffer::import_host) must be
+    /// multiples; none where VK_EXT_external_memory_host is not enabled.
+    pub fn host_import_alignment(&self) -> Option<u64> {
+        self.handles.host_memory.as_ref().map(|host| host.alignment)
+    }
+
     /// Errors and warnings of the validation layer so far; none without `DeviceOptions::validation`.
     pub fn validation_messages(&self) -> Vec<String> {
         self.handles.log.messages()
@@ -124,70 +279,98 @@ impl Handles {
         let priorities = [1.0];
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(chosen.family).queue_priorities(&priorities)];
-        // maintenance4, which every Vulkan 1.3 device has, lets the workgroup size be a specialization constant.
-        let mut features12 = vk::PhysicalDeviceVulkan12Features::default().scalar_block_layout(true);
-        let mut features13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
-        let create = vk::DeviceCreateInfo::default()
-            .queue_create_infos(&queues)
-            .push_next(&mut features12)
-            .push_next(&mut features13);
+        let extensions: &[_] = if chosen.host_import { &[external_memory_host::NAME.as_ptr()] } else { &[] };
+        let mut requirements = Requirements::new();
+        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(extensions);
+        let create = requirements.chain(create);
         // SAFETY: the physical device is of this instance and has the features; all pointers outlive the call.
         let device = unsafe { instance.raw.create_device(physical, &create, None) }.during("create the device")?;
         // SAFETY: the device was made with one queue of this family.
         let queue = unsafe { device.get_device_queue(chosen.family, 0) };
-
-        let mut maintenance3 = vk::PhysicalDeviceMaintenance3Properties::default();
-        let mut maintenance4 = vk::PhysicalDeviceMaintenance4Properties::default();
-        let mut properties =
-            vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance3).push_next(&mut maintenance4);
-        // SAFETY: the device is of this instance and speaks Vulkan 1.3.
-        let (families, heaps) = unsafe {
-            instance.raw.get_physical_device_properties2(physical, &mut properties);
-            (
-                instance.raw.get_physical_device_queue_family_properties(physical),
-                instance.raw.get_physical_device_memory_properties(physical),
-            )
-        };
-        let limits = properties.properties.limits;
-        let max_buffer_bytes = u64::from(limits.max_storage_buffer_range)
-            .min(maintenance3.max_memory_allocation_size)
-            .min(maintenance4.max_buffer_size)
-            .min(options.buffer_bytes.unwrap_or(u64::MAX));
-        let mut handles = Handles {
-            queue: Mutex::new(queue),
-            family: chosen.family,
-            debug_utils: instance.debug_utils.then(|| debug_utils::Device::new(&instance.raw, &device)),
-            info: chosen.info.clone(),
-            limits,
-            timestamp_bits: families[chosen.family as usize].timestamp_valid_bits,
-            force_staging: options.staging,
-            max_buffer_bytes,
-            heap_bytes: buffer_heap(&device, &heaps),
-            allocator: Mutex::new(None),
-            log: instance.log.clone(),
-            owned: None,
+        let raw = instance.raw.clone();
+        let mut handles = Handles::new(Parts {
+            instance: &raw,
+            physical,
             device,
-        };
-        let description = memory::AllocatorCreateDesc {
-            instance: instance.raw.clone(),
-            device: handles.device.clone(),
-            physical_device: physical,
-            debug_settings: Default::default(),
-            buffer_device_address: false,
-            allocation_sizes: AllocationSizes::new(BLOCK_BYTES, BLOCK_BYTES),
-        };
+            queue: Some(queue),
+            family: chosen.family,
+            info: chosen.info.clone(),
+            debug_utils: instance.debug_utils,
+            host_import: chosen.host_import,
+            pipeline_cache: vk::PipelineCache::null(),
+            log: instance.log.clone(),
+        });
+        handles.force_staging = options.staging;
+        handles.max_buffer_bytes = handles.max_buffer_bytes.min(options.buffer_bytes.unwrap_or(u64::MAX));
         // From here on dropping `handles` destroys the device, before the instance.
         handles.owned = Some(instance);
-        let allocator = memory::Allocator::new(&description)
-            .map_err(|error| Error::Memory { step: "start the allocator".into(), problem: error.to_string() })?;
-        handles.allocator = Mutex::new(Some(allocator));
+        handles.allocator = Some(own_allocator(&raw, physical, &handles.device)?);
         Ok(handles)
     }
 
-    /// The allocator, for one allocation or release.
-    pub fn with_allocator<T>(&self, use_it: impl FnOnce(&mut memory::Allocator) -> T) -> T {
-        let mut guard = lock(&self.allocator);
-        use_it(guard.as_mut().expect("the allocator lives as long as the handles"))
+    /// Handles without an allocator, which own nothing.
+    fn new(parts: Parts) -> Handles {
+        let Parts { instance, physical, device, queue, family, .. } = parts;
+        let mut maintenance3 = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut maintenance4 = vk::PhysicalDeviceMaintenance4Properties::default();
+        let mut host = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
+        let mut properties =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance3).push_next(&mut maintenance4);
+        if parts.host_import {
+            properties = properties.push_next(&mut host);
+        }
+        // SAFETY: the device is of this instance and speaks Vulkan 1.3.
+        let (families, heaps) = unsafe {
+            instance.get_physical_device_properties2(physical, &mut properties);
+            (
+                instance.get_physical_device_queue_family_properties(physical),
+                instance.get_physical_device_memory_properties(physical),
+            )
+        };
+        let limits = properties.properties.limits;
+        Handles {
+            queue: queue.map(Mutex::new),
+            family,
+            debug_utils: parts.debug_utils.then(|| debug_utils::Device::new(instance, &device)),
+            host_memory: parts.host_import.then(|| HostMemory {
+                functions: external_memory_host::Device::new(instance, &device),
+                alignment: host.min_imported_host_pointer_alignment,
+                types: heaps,
+            }),
+            pipeline_cache: parts.pipeline_cache,
+            info: parts.info,
+            limits,
+            timestamp_bits: families[family as usize].timestamp_valid_bits,
+            force_staging: false,
+            max_buffer_bytes: u64::from(limits.max_storage_buffer_range)
+                .min(maintenance3.max_memory_allocation_size)
+                .min(maintenance4.max_buffer_size),
+            heap_bytes: buffer_heap(&device, &heaps),
+            allocator: None,
+            log: parts.log,
+            owned: None,
+            device,
+        }
+    }
+
+    /// Memory for one buffer.
+    pub fn allocate(&self, request: &MemoryRequest) -> std::result::Result<Allocation, String> {
+        self.allocator().allocate(request)
+    }
+
+    /// Gives back what [`Handles::allocate`] gave.
+    pub fn free(&self, allocation: Allocation) {
+        self.allocator().free(allocation);
+    }
+
+    fn allocator(&self) -> &dyn Allocator {
+        self.allocator.as_deref().expect("the allocator lives as long as the handles")
+    }
+
+    /// The queue, for one submission.
+    pub fn queue(&self) -> Result<MutexGuard<'_, vk::Queue>> {
+        let none = || Error::Device("the caller's device was given without a queue, which this needs".into());
+        self.queue.as_ref().map(lock).ok_or_else(none)
     }
 
     /// Gives an object the name that debuggers and validation messages show.
@@ -204,12 +387,31 @@ impl Handles {
 impl Drop for Handles {
     fn drop(&mut self) {
         // The allocator frees its memory through the device, so it goes first.
-        drop(lock(&self.allocator).take());
+        drop(self.allocator.take());
         if self.owned.is_some() {
             // SAFETY: everything made from the device held these handles and is gone.
             unsafe { self.device.destroy_device(None) };
         }
     }
+}
+
+/// An allocator for a device that has none.
+fn own_allocator(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    device: &ash::Device,
+) -> Result<Arc<dyn Allocator>> {
+    let description = memory::AllocatorCreateDesc {
+        instance: instance.clone(),
+        device: device.clone(),
+        physical_device: physical,
+        debug_settings: Default::default(),
+        buffer_device_address: false,
+        allocation_sizes: AllocationSizes::new(BLOCK_BYTES, BLOCK_BYTES),
+    };
+    let allocator = memory::Allocator::new(&description)
+        .map_err(|error| Error::Memory { step: "start the allocator".into(), problem: error.to_string() })?;
+    Ok(Arc::new(Mutex::new(allocator)))
 }
 
 /// Locks; what a panicking thread left behind is whole, since every guarded change is one call.

@@ -5,7 +5,10 @@ use crate::{
     Error, Result,
     shared::{Slot, Step},
 };
-use ash::{ext::debug_utils, vk};
+use ash::{
+    ext::{debug_utils, external_memory_host},
+    vk,
+};
 use std::{
     ffi::{CStr, c_void},
     fmt,
@@ -88,6 +91,8 @@ pub(super) struct Instance {
 pub(super) struct Candidate {
     pub physical: vk::PhysicalDevice,
     pub family: u32,
+    /// It has VK_EXT_external_memory_host.
+    pub host_import: bool,
     pub info: DeviceInfo,
 }
 
@@ -173,78 +178,80 @@ impl Instance {
         if devices.is_empty() {
             return Err(Error::Device(NO_DRIVER.into()));
         }
-        Ok(devices.into_iter().enumerate().map(|(index, physical)| self.candidate(index, physical)).collect())
+        Ok(devices.into_iter().enumerate().map(|(index, physical)| describe(&self.raw, index, physical)).collect())
     }
+}
 
-    fn candidate(&self, index: usize, physical: vk::PhysicalDevice) -> Candidate {
-        // SAFETY: the device belongs to this instance.
-        let properties = unsafe { self.raw.get_physical_device_properties(physical) };
-        let version = properties.api_version;
-        let mut lacks = Vec::new();
+/// A physical device of `instance`, with what it lacks.
+pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
+    // SAFETY: the device belongs to this instance.
+    let properties = unsafe { instance.get_physical_device_properties(physical) };
+    let version = properties.api_version;
+    let mut lacks = Vec::new();
 
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut id = vk::PhysicalDeviceIDProperties::default();
-        if version >= vk::API_VERSION_1_2 {
-            let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut id);
-            // SAFETY: the device is this instance's and knows the structures of Vulkan 1.2.
-            unsafe { self.raw.get_physical_device_properties2(physical, &mut chain) };
-        }
-        if version >= vk::API_VERSION_1_3 {
-            let mut features12 = vk::PhysicalDeviceVulkan12Features::default();
-            let mut features13 = vk::PhysicalDeviceVulkan13Features::default();
-            let mut chain =
-                vk::PhysicalDeviceFeatures2::default().push_next(&mut features12).push_next(&mut features13);
-            // SAFETY: the device is this instance's and knows the structures of Vulkan 1.3.
-            unsafe { self.raw.get_physical_device_features2(physical, &mut chain) };
-            for (has, name) in [
-                (features12.scalar_block_layout, "scalarBlockLayout"),
-                (features13.synchronization2, "synchronization2"),
-                (features13.maintenance4, "maintenance4"),
-            ] {
-                if has == vk::FALSE {
-                    lacks.push(format!("the feature {name}"));
-                }
-            }
-        } else {
-            lacks.push(format!("Vulkan 1.3 (it has {})", version_text(version)));
-        }
-        let limits = &properties.limits;
-        for (name, has, needs) in [
-            ("storage buffers per stage", limits.max_per_stage_descriptor_storage_buffers, Slot::ALL.len()),
-            ("storage buffers per set", limits.max_descriptor_set_storage_buffers, Slot::ALL.len()),
-            ("bytes of push constants", limits.max_push_constants_size, size_of::<Step>()),
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut id = vk::PhysicalDeviceIDProperties::default();
+    if version >= vk::API_VERSION_1_2 {
+        let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut id);
+        // SAFETY: the device is this instance's and knows the structures of Vulkan 1.2.
+        unsafe { instance.get_physical_device_properties2(physical, &mut chain) };
+    }
+    if version >= vk::API_VERSION_1_3 {
+        let mut features12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut features13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut features12).push_next(&mut features13);
+        // SAFETY: the device is this instance's and knows the structures of Vulkan 1.3.
+        unsafe { instance.get_physical_device_features2(physical, &mut chain) };
+        for (has, name) in [
+            (features12.scalar_block_layout, "scalarBlockLayout"),
+            (features13.synchronization2, "synchronization2"),
+            (features13.maintenance4, "maintenance4"),
         ] {
-            if (has as usize) < needs {
-                lacks.push(format!("{needs} {name} (it has {has})"));
+            if has == vk::FALSE {
+                lacks.push(format!("the feature {name}"));
             }
         }
-        // SAFETY: the device belongs to this instance.
-        let families = unsafe { self.raw.get_physical_device_queue_family_properties(physical) };
-        let family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
-        if family.is_none() {
-            lacks.push("a compute queue".into());
-        }
-
-        let text = |text: std::result::Result<&CStr, _>| text.map_or(String::new(), |t| t.to_string_lossy().into());
-        let driver_name = text(driver.driver_name_as_c_str());
-        let driver_info: String = text(driver.driver_info_as_c_str());
-        let info = DeviceInfo {
-            index,
-            name: text(properties.device_name_as_c_str()),
-            driver: format!("{driver_name} {driver_info}").trim().to_string(),
-            kind: match properties.device_type {
-                vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
-                vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
-                vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
-                vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
-                _ => DeviceKind::Other,
-            },
-            uuid: uuid_text(&id.device_uuid),
-            api_version: version_text(version),
-            lacks,
-        };
-        Candidate { physical, family: family.unwrap_or(0) as u32, info }
+    } else {
+        lacks.push(format!("Vulkan 1.3 (it has {})", version_text(version)));
     }
+    let limits = &properties.limits;
+    for (name, has, needs) in [
+        ("storage buffers per stage", limits.max_per_stage_descriptor_storage_buffers, Slot::ALL.len()),
+        ("storage buffers per set", limits.max_descriptor_set_storage_buffers, Slot::ALL.len()),
+        ("bytes of push constants", limits.max_push_constants_size, size_of::<Step>()),
+    ] {
+        if (has as usize) < needs {
+            lacks.push(format!("{needs} {name} (it has {has})"));
+        }
+    }
+    // SAFETY: the device belongs to this instance; so for the next call.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+    let extensions = unsafe { instance.enumerate_device_extension_properties(physical) }.unwrap_or_default();
+    let named = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+    let family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+    if family.is_none() {
+        lacks.push("a compute queue".into());
+    }
+
+    let text = |text: std::result::Result<&CStr, _>| text.map_or(String::new(), |t| t.to_string_lossy().into());
+    let driver_name = text(driver.driver_name_as_c_str());
+    let driver_info: String = text(driver.driver_info_as_c_str());
+    let info = DeviceInfo {
+        index,
+        name: text(properties.device_name_as_c_str()),
+        driver: format!("{driver_name} {driver_info}").trim().to_string(),
+        kind: match properties.device_type {
+            vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+            vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+            _ => DeviceKind::Other,
+        },
+        uuid: uuid_text(&id.device_uuid),
+        api_version: version_text(version),
+        lacks,
+    };
+    Candidate { physical, family: family.unwrap_or(0) as u32, host_import: named(external_memory_host::NAME), info }
 }
 
 impl Drop for Instance {
@@ -280,7 +287,7 @@ unsafe extern "system" fn report(
     vk::FALSE
 }
 
-fn version_text(version: u32) -> String {
+pub(super) fn version_text(version: u32) -> String {
     format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version))
 }
 

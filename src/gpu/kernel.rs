@@ -62,6 +62,8 @@ impl Layout {
         // SAFETY: as above.
         objects.pipeline =
             unsafe { handles.device.create_pipeline_layout(&create, None) }.during("create the pipeline layout")?;
+        handles.name(objects.set, "slots");
+        handles.name(objects.pipeline, "layout");
         objects.absent = Some(Buffer::with_handles(handles, "absent", 4, Location::Device)?.memory);
         Ok(Layout { objects: Arc::new(objects) })
     }
@@ -124,6 +126,7 @@ impl Bindings {
         // SAFETY: pool and layout are alive and of this device.
         objects.set =
             unsafe { handles.device.allocate_descriptor_sets(&allocate) }.during("allocate the descriptor set")?[0];
+        handles.name(objects.set, "bindings");
         let ranges: Vec<_> = objects
             ._buffers
             .iter()
@@ -217,7 +220,7 @@ impl Kernel {
         let create = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.objects.pipeline)];
         // SAFETY: module and layout are alive, all pointers outlive the call. A pipeline needs its module no longer.
         let pipeline = unsafe {
-            let made = handles.device.create_compute_pipelines(vk::PipelineCache::null(), &create, None);
+            let made = handles.device.create_compute_pipelines(handles.pipeline_cache, &create, None);
             handles.device.destroy_shader_module(module, None);
             made.map_err(|(_, result)| result).during(&step)?[0]
         };

@@ -1,22 +1,28 @@
 //! The thin layer over Vulkan 1.3 compute: device, buffers, kernels, recordings. It knows slots and features, not
 //! scenes, and it is the only place with `unsafe`.
 //!
-//! Everything here keeps what it uses alive, so any order of dropping is right. Nothing is global: a process may
-//! open several devices.
+//! Everything here keeps what it uses alive, so any order of dropping is right; only [`Commands`] in a caller's command
+//! buffer leave that to the caller. Nothing is global: a process may open several devices.
 
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod buffer;
+mod commands;
 mod device;
 mod instance;
 mod kernel;
+mod memory;
 mod recorder;
+mod requirements;
 
 pub use buffer::{Buffer, Location, download, download_to, upload};
-pub use device::{Device, DeviceOptions};
+pub use commands::{Commands, Timestamps};
+pub use device::{Device, DeviceOptions, RawDevice};
 pub use instance::{DeviceInfo, DeviceKind, ValidationLog};
 pub use kernel::{Bindings, Kernel, Layout};
+pub use memory::{Allocation, Allocator, MemoryRequest};
 pub use recorder::Recorder;
+pub use requirements::Requirements;
 
 use crate::{Error, Result};
 use ash::vk;

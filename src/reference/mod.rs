@@ -6,7 +6,9 @@
 
 pub mod accumulate;
 pub mod area;
+pub mod begin;
 pub mod boundary;
+pub mod clear;
 pub mod emitter;
 pub mod intersect;
 pub mod light;

@@ -1,7 +1,7 @@
 //! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it. Every value is
 //! finite: what exceeds f32 is its largest number.
 
-use super::{Film, Renderer, spirv_hash};
+use super::{Film, Renderer, own, spirv_hash};
 use crate::{
     error::Result,
     gpu::{Buffer, download_to},
@@ -21,6 +21,7 @@ pub enum Sums {
 /// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z, samples,
 /// material.
 pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
+    renderer.catch_up();
     let view = renderer.prepared.view;
     let rows = renderer.prepared.rows.clone();
     let count = (view.crop_width * (rows.end - rows.start)) as usize;
@@ -47,6 +48,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         // The G-buffer of batch 0 is overwritten; its stratum is traced anew before the next sample.
         renderer.strata[0] = None;
         let Renderer { recorder, kernels, bindings, .. } = renderer;
+        let recorder = own(recorder)?;
         recorder.begin()?;
         for kernel in [&kernels.resolve, &kernels.primary].into_iter().flatten() {
             recorder.dispatch(kernel, bindings, pixels, &step);

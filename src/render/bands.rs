@@ -42,6 +42,9 @@ pub fn slots(prepared: &Prepared) -> Vec<Slot> {
     if prepared.features.batches != 0 {
         slots.push(Slot::BatchSums);
     }
+    if prepared.features.recorded != 0 {
+        slots.push(Slot::Colors);
+    }
     slots
 }
 
@@ -58,7 +61,7 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let whole: u64 = slots.iter().map(|slot| bytes_per_pixel(*slot)).sum();
     // Half of the heap is left to the scene and to others.
     let limit = (limits.buffer_bytes / widest).min(limits.heap_bytes / 2 / whole);
-    let wanted = settings.band_pixels.unwrap_or(BAND_PIXELS).max(1);
+    let wanted = if settings.recording { u32::MAX } else { settings.band_pixels.unwrap_or(BAND_PIXELS).max(1) };
     let width = prepared.view.crop_width;
     if u64::from(width) > limit {
         return Err(Error::Memory {
@@ -69,6 +72,11 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let rows = prepared.rows.end - prepared.rows.start;
     let most = (u64::from(wanted).min(limit) / u64::from(width)).clamp(1, u64::from(rows)) as u32;
     let count = rows.div_ceil(most);
+    if settings.recording && count > 1 {
+        let problem =
+            format!("{rows} rows of {width} pixels need more than the device binds; lower the resolution or crop");
+        return Err(Error::Memory { step: "make one band for recordings".into(), problem });
+    }
     Ok((0..count)
         .map(|band| {
             let edge = |band: u32| (u64::from(rows) * u64::from(band) / u64::from(count)) as u32;

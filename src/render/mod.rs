@@ -3,8 +3,11 @@
 mod assemble;
 mod bands;
 mod plan;
+mod record;
+mod update;
 
 pub use plan::{BufferUse, KernelUse, Limits, Plan, value_name};
+pub use record::Output;
 
 use crate::{
     error::{Error, Result},
@@ -12,9 +15,9 @@ use crate::{
     image::Image,
     prepare::{Prepared, prepare},
     reference::random,
-    scene::{Frame, Scene},
+    scene::{self, Frame, Scene},
     settings::Settings,
-    shared::{BATCHES, MAX_RAYS, MAX_SINGLE, STRATUM, Slot, Step},
+    shared::{BATCHES, MAX_RAYS, MAX_SINGLE, NO_SAMPLES, Progress as Count, STRATUM, Slot, Step},
 };
 use bands::{Band, Film};
 use std::ops::{ControlFlow, Range};
@@ -27,6 +30,9 @@ const SUBMISSION: u64 = 1 << 20;
 
 /// What a band takes along when it leaves the device.
 const SUMS: [Slot; 2] = [Slot::RunningSums, Slot::BatchSums];
+
+/// What the host writes between recordings.
+const WRITTEN: [Slot; 4] = [Slot::Views, Slot::Lights, Slot::Materials, Slot::Progresses];
 
 macro_rules! kernels {
     ($($stem:ident),*) => {
@@ -57,7 +63,7 @@ macro_rules! kernels {
             &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
     };
 }
-kernels!(primary, sample, reproject, accumulate, reflect, single, resolve);
+kernels!(begin, clear, primary, sample, reproject, accumulate, reflect, single, resolve);
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -69,16 +75,22 @@ pub struct Progress {
 }
 
 /// Renders one scene with one set of settings. Samples add up over calls until [`Renderer::reset`].
+///
+/// It may move to another thread, and be used by one at a time; several renderers, on one device or several, may be used
+/// at once.
 pub struct Renderer {
     device: Device,
     frame: Frame,
     /// [`Scene::hash`].
     scene_hash: String,
+    /// The scene's materials as authored.
+    authored: Vec<scene::Material>,
     settings: Settings,
     prepared: Prepared,
     kernels: Kernels,
     bindings: Bindings,
-    recorder: Recorder,
+    /// None on a caller's device without a queue.
+    recorder: Option<Recorder>,
     buffers: Vec<(Slot, Buffer)>,
     bands: Vec<Band>,
     /// Band and samples whose G-buffers the device holds: batch b is at stratum `strata[b]`.
@@ -93,22 +105,58 @@ impl Renderer {
     ///
     /// Fails if the settings do not fit the scene, or a buffer does not fit the device.
     pub fn new(device: &Device, scene: &Scene, settings: &Settings) -> Result<Renderer> {
+        Renderer::with_buffers(device, scene, settings, vec![])
+    }
+
+    /// As [`Renderer::new`], with buffers of the caller's in place of our own: geometry, results, or any slot but
+    /// `Progresses`, as [`Plan`] lists them. Elements are laid out as [`crate::shared`] says, without padding. What the
+    /// scene determines is written to them here: the BVH and the order of its triangles are made on the host.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`]; [`Error::Setting`] for a buffer that is too small, and for one that has to be filled on a
+    /// device without a queue where the host does not reach it.
+    pub fn with_buffers(
+        device: &Device,
+        scene: &Scene,
+        settings: &Settings,
+        buffers: Vec<(Slot, Buffer)>,
+    ) -> Result<Renderer> {
         let prepared = prepare(scene, settings)?;
-        Renderer::with_features(device, scene, settings, prepared)
+        Renderer::with_features(device, scene, settings, prepared, buffers)
     }
 
     /// As [`Renderer::new`], with traversal steps counted.
     pub fn counting(device: &Device, scene: &Scene, settings: &Settings) -> Result<Renderer> {
         let mut prepared = prepare(scene, settings)?;
         prepared.features.counters = 1;
-        Renderer::with_features(device, scene, settings, prepared)
+        Renderer::with_features(device, scene, settings, prepared, vec![])
     }
 
-    fn with_features(device: &Device, scene: &Scene, settings: &Settings, prepared: Prepared) -> Result<Renderer> {
+    fn with_features(
+        device: &Device,
+        scene: &Scene,
+        settings: &Settings,
+        prepared: Prepared,
+        mut given: Vec<(Slot, Buffer)>,
+    ) -> Result<Renderer> {
         if !(1..=128).contains(&settings.workgroup) {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
         }
         let kernels = Kernels::new(device, &prepared, settings.workgroup)?;
+        let recording = settings.recording;
+        let mut take = |slot: Slot, bytes: u64, location: Location| {
+            let Some(position) = given.iter().position(|(named, _)| *named == slot) else {
+                let location = if recording && WRITTEN.contains(&slot) { Location::Upload } else { location };
+                return Buffer::new(device, slot.name(), bytes, location);
+            };
+            let (_, buffer) = given.swap_remove(position);
+            let problem = match slot {
+                Slot::Progresses => "must be the renderer's own".into(),
+                _ if buffer.bytes() < bytes => format!("has {} bytes; {bytes} are needed", buffer.bytes()),
+                _ => return Ok(buffer),
+            };
+            Err(Error::setting(format!("the caller's buffer {}", slot.name()), problem))
+        };
         let mut buffers = Vec::new();
         for (slot, data) in scene_data(scene, &prepared) {
             let limit = device.max_storage_buffer_range();
@@ -120,7 +168,7 @@ impl Renderer {
                 );
                 return Err(Error::Memory { step: format!("create buffer {}", slot.name()), problem });
             }
-            let buffer = Buffer::new(device, slot.name(), data.len() as u64, Location::Device)?;
+            let buffer = take(slot, data.len() as u64, Location::Device)?;
             upload(device, &buffer, data)?;
             buffers.push((slot, buffer));
         }
@@ -128,26 +176,35 @@ impl Renderer {
         let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
         for (slot, bytes) in plan::sizes(scene, &prepared, pixels) {
             if buffers.iter().all(|(made, _)| *made != slot) {
-                buffers.push((slot, Buffer::new(device, slot.name(), bytes, Location::Device)?));
+                buffers.push((slot, take(slot, bytes, Location::Scratch)?));
             }
+        }
+        if let Some((slot, _)) = given.first() {
+            return Err(Error::setting(format!("the caller's buffer {}", slot.name()), "the scene does not need it"));
+        }
+        if let Some((_, counts)) = buffers.iter().find(|(slot, _)| *slot == Slot::Progresses) {
+            counts.write(&[Count { end: NO_SAMPLES, ..Count::default() }]);
         }
         if let Some((_, counters)) = buffers.iter().find(|(slot, _)| *slot == Slot::Counters) {
             upload(device, counters, bytemuck::bytes_of(&0u32))?;
         }
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
         let bindings = Bindings::new(&Layout::new(device)?, &bound)?;
+        let recorder = if device.has_queue() { Some(Recorder::new(device)?) } else { None };
         Ok(Renderer {
             device: device.clone(),
             frame: scene.frame,
             scene_hash: scene.hash.clone(),
+            authored: scene.materials.clone(),
             settings: settings.clone(),
             prepared,
             kernels,
             bindings,
-            recorder: Recorder::new(device)?,
+            recorder,
             buffers,
             bands,
-            resident: None,
+            // The sums of recordings never leave the device.
+            resident: recording.then_some(0),
             strata: [None; BATCHES as usize],
             begin: None,
         })
@@ -178,6 +235,9 @@ impl Renderer {
     /// The samples that every pixel has. After an interruption some bands of several may have up to 32 more: those
     /// samples count in their means and variances, and their number is in the image's channel `samples.Y`.
     pub fn samples(&self) -> Range<u32> {
+        if let Some(count) = self.count() {
+            return if count.end == NO_SAMPLES { 0..0 } else { count.begin..count.end };
+        }
         let begin = self.begin.unwrap_or(0);
         begin..self.bands.iter().map(|band| band.end).min().unwrap_or(begin)
     }
@@ -185,7 +245,8 @@ impl Renderer {
     /// Forgets every sample.
     pub fn reset(&mut self) {
         self.begin = None;
-        self.resident = None;
+        self.resident = self.settings.recording.then_some(0);
+        self.set_count(Count { end: NO_SAMPLES, ..self.count().unwrap_or_default() });
         for band in &mut self.bands {
             band.film = Film::Empty;
             band.end = 0;
@@ -208,6 +269,7 @@ impl Renderer {
         range: Range<u32>,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<bool> {
+        self.catch_up();
         if range.start >= range.end {
             return Err(Error::setting("samples", format!("{}:{} holds no sample", range.start, range.end)));
         }
@@ -253,16 +315,17 @@ impl Renderer {
         }
         self.save_resident()?;
         let film = std::mem::replace(&mut self.bands[band].film, Film::OnDevice);
-        self.recorder.begin()?;
+        let recorder = own(&mut self.recorder)?;
+        recorder.begin()?;
         for (index, slot) in SUMS.into_iter().enumerate() {
             let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
             if film == Film::OnHost {
                 upload(&self.device, buffer, &self.bands[band].sums[index])?;
             } else {
-                self.recorder.fill(buffer, 0);
+                recorder.fill(buffer, 0);
             }
         }
-        self.recorder.submit_and_wait()?;
+        recorder.submit_and_wait()?;
         self.resident = Some(band);
         self.strata = [None; BATCHES as usize];
         Ok(())
@@ -281,51 +344,28 @@ impl Renderer {
     }
 
     fn submit_samples(&mut self, band: usize, samples: Range<u32>) -> Result<()> {
-        self.recorder.begin()?;
-        for sample in samples.clone() {
-            self.record_sample(band, sample)?;
-        }
-        self.recorder.submit_and_wait()?;
-        self.bands[band].end = samples.end;
-        Ok(())
-    }
-
-    /// The whole pipeline, for one sample of one band.
-    fn record_sample(&mut self, band: usize, sample_index: u32) -> Result<()> {
-        let Band { first_row, pixels, .. } = self.bands[band];
-        let point = random::point(sample_index);
-        let mut step =
-            Step { first_row, pixel_count: pixels, sample_index, point, first: 1, count: 1, ..Step::default() };
-        let Renderer { kernels, bindings, recorder, prepared, strata, .. } = self;
-
-        let mut dispatch = |kernel: &Option<Kernel>, step: &Step| {
-            kernel.iter().for_each(|kernel| recorder.dispatch(kernel, bindings, pixels, step));
-            kernel.is_some()
+        let Renderer { kernels, bindings, prepared, strata, bands, .. } = self;
+        let recorder = own(&mut self.recorder)?;
+        recorder.begin()?;
+        let mut dispatch = |kernel: &Kernel, invocations: u32, step: &Step| {
+            recorder.dispatch(kernel, bindings, invocations, step);
         };
-
-        let resident = &mut strata[(sample_index % BATCHES) as usize];
-        if *resident != Some(random::stratum(sample_index)) {
-            dispatch(&kernels.primary, &step);
-            *resident = Some(random::stratum(sample_index));
-        }
-        dispatch(&kernels.sample, &step);
-        dispatch(&kernels.reproject, &step);
-        // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty portion.
-        for begin in (0..prepared.ray_count.max(1)).step_by(MAX_RAYS as usize) {
-            step.ray_begin = begin;
-            step.ray_count = (prepared.ray_count - begin.min(prepared.ray_count)).min(MAX_RAYS);
-            for kernel in [&kernels.accumulate, &kernels.reflect] {
-                if dispatch(kernel, &step) {
-                    step.count = 0;
-                }
+        let Band { first_row, pixels, .. } = bands[band];
+        if let Some(count) = count(&self.buffers) {
+            let range = samples.start.wrapping_sub(count.first)..samples.end.wrapping_sub(count.first);
+            kernels.recording(prepared, &bands[band], range, &mut dispatch);
+        } else {
+            for sample_index in samples.clone() {
+                let point = random::point(sample_index);
+                let step = Step { first_row, pixel_count: pixels, sample_index, point, ..Step::default() };
+                let stratum = Some(random::stratum(sample_index));
+                let resident = &mut strata[random::batch(sample_index) as usize];
+                kernels.sample(prepared, step, *resident != stratum, &mut dispatch);
+                *resident = stratum;
             }
-            step.first = 0;
         }
-        for begin in (0..prepared.ray_count).step_by(MAX_SINGLE as usize) {
-            step.ray_begin = begin;
-            step.ray_count = (prepared.ray_count - begin).min(MAX_SINGLE);
-            dispatch(&kernels.single, &step);
-        }
+        recorder.submit_and_wait()?;
+        bands[band].end = samples.end;
         Ok(())
     }
 
@@ -348,8 +388,63 @@ impl Renderer {
     }
 
     fn buffer(&self, slot: Slot) -> Option<&Buffer> {
-        self.buffers.iter().find(|(s, _)| *s == slot).map(|(_, buffer)| buffer)
+        find(&self.buffers, slot)
     }
+}
+
+impl Kernels {
+    /// The dispatches of one sample of a band, in order: kernel, invocations, constants. `primary` is among them unless
+    /// the G-buffer of the sample's batch holds.
+    fn sample(
+        &self,
+        prepared: &Prepared,
+        mut step: Step,
+        primary: bool,
+        dispatch: &mut dyn FnMut(&Kernel, u32, &Step),
+    ) {
+        let pixels = step.pixel_count;
+        (step.first, step.count) = (1, 1);
+        let mut dispatch = |kernel: &Option<Kernel>, step: &Step| {
+            kernel.iter().for_each(|kernel| dispatch(kernel, pixels, step));
+            kernel.is_some()
+        };
+        if primary {
+            dispatch(&self.primary, &step);
+        }
+        dispatch(&self.sample, &step);
+        dispatch(&self.reproject, &step);
+        // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty portion.
+        for begin in (0..prepared.ray_count.max(1)).step_by(MAX_RAYS as usize) {
+            step.ray_begin = begin;
+            step.ray_count = (prepared.ray_count - begin.min(prepared.ray_count)).min(MAX_RAYS);
+            for kernel in [&self.accumulate, &self.reflect] {
+                if dispatch(kernel, &step) {
+                    step.count = 0;
+                }
+            }
+            step.first = 0;
+        }
+        for begin in (0..prepared.ray_count).step_by(MAX_SINGLE as usize) {
+            step.ray_begin = begin;
+            step.ray_count = (prepared.ray_count - begin).min(MAX_SINGLE);
+            dispatch(&self.single, &step);
+        }
+    }
+}
+
+/// The recorder of a device with a queue.
+fn own(recorder: &mut Option<Recorder>) -> Result<&mut Recorder> {
+    let none = || Error::Device("the caller's device was given without a queue: record instead of rendering".into());
+    recorder.as_mut().ok_or_else(none)
+}
+
+fn find(buffers: &[(Slot, Buffer)], slot: Slot) -> Option<&Buffer> {
+    buffers.iter().find(|(s, _)| *s == slot).map(|(_, buffer)| buffer)
+}
+
+/// Which samples the sums hold, where recordings keep count of them.
+fn count(buffers: &[(Slot, Buffer)]) -> Option<Count> {
+    find(buffers, Slot::Progresses).map(|counts| counts.read()[0])
 }
 
 /// The buffers that only a scene and its settings determine, as bytes. A scene without lights or environment has none

@@ -7,7 +7,7 @@ use crate::{
     prepare::{Prepared, prepare},
     scene::Scene,
     settings::Settings,
-    shared::{self, Slot},
+    shared::{self, MAX_RECORDED, Slot},
 };
 
 /// What a device allows.
@@ -103,6 +103,10 @@ impl Plan {
 pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
     match stem {
         "primary" => (true, "finds the surface that each pixel sees"),
+        "begin" | "clear" => match prepared.features.recorded != 0 {
+            true => (true, "recordings keep count of their samples on the device"),
+            false => (false, "nothing is recorded into a caller's command buffer"),
+        },
         "resolve" => (true, "makes means and variances of the sums"),
         "sample" | "reproject" | "accumulate" => match prepared.has_translucent {
             true => (true, "a surface is translucent"),
@@ -126,7 +130,10 @@ pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slo
     let of_band =
         bands::slots(prepared).into_iter().map(|slot| (slot, bands::bytes_per_pixel(slot) * u64::from(pixels)));
     let counters = (prepared.features.counters != 0).then_some((Slot::Counters, 4));
-    of_scene.chain(of_band).chain(counters).collect()
+    let recorded = [(Slot::Progresses, 1), (Slot::Samples, MAX_RECORDED)];
+    let recorded = recorded.into_iter().filter(|_| prepared.features.recorded != 0);
+    let recorded = recorded.map(|(slot, elements)| (slot, u64::from(elements) * slot.stride() as u64));
+    of_scene.chain(of_band).chain(counters).chain(recorded).collect()
 }
 
 /// Why a slot has no buffer.
@@ -140,6 +147,7 @@ fn absent(slot: Slot) -> String {
         Slot::Thickness => "no profile depends on the curvature",
         Slot::Probes | Slot::HitLists => "no surface is translucent",
         Slot::BatchSums => "no variance is asked for",
+        Slot::Progresses | Slot::Samples | Slot::Colors => "nothing is recorded into a caller's command buffer",
         Slot::Counters => "steps are counted in tests and benchmarks only",
         _ => "nothing in the scene needs it",
     };

@@ -88,32 +88,43 @@ pub(super) fn internal(
 
 /// Refuses lights and cameras whose internal numbers f32 could not hold.
 pub(super) fn check_nodes(file: &Path, frame: &Frame, lights: &[Light], cameras: &[Camera]) -> Result<()> {
-    let far = |position: DVec3| {
-        let reach = ((position - frame.centre) * frame.scale).abs().max_element();
-        (reach > COORDINATE_MAX).then(|| format!("is {reach:e} times as far as the translucent part's radius"))
-    };
     for light in lights {
-        let (position, factor) = match light.kind {
-            LightKind::Directional => (frame.centre, 1.0),
-            LightKind::Point | LightKind::Spot { .. } => (light.position, frame.scale * frame.scale),
-        };
-        let bright = light.intensity.max_element() * factor > INTENSITY_MAX;
-        let bright = bright.then(|| format!("is brighter than {INTENSITY_MAX:e} in internal units"));
-        if let Some(problem) = far(position).or(bright) {
+        if let Some(problem) = light_beyond(frame, light) {
             return Err(Error::scene(file, format!("light `{}`", shorten(&light.name)), problem));
         }
     }
     for camera in cameras {
-        let wide = match camera.lens {
-            Lens::Perspective { .. } => false,
-            Lens::Orthographic { xmag, ymag } => xmag.max(ymag) * frame.scale > COORDINATE_MAX,
-        };
-        let wide = wide.then(|| format!("sees more than {COORDINATE_MAX:e} times the translucent part's radius"));
-        if let Some(problem) = far(camera.eye).or(wide) {
+        if let Some(problem) = camera_beyond(frame, camera) {
             return Err(Error::scene(file, format!("camera `{}`", shorten(&camera.name)), problem));
         }
     }
     Ok(())
+}
+
+/// What f32 could not hold of a light.
+pub(super) fn light_beyond(frame: &Frame, light: &Light) -> Option<String> {
+    let (position, factor) = match light.kind {
+        LightKind::Directional => (frame.centre, 1.0),
+        LightKind::Point | LightKind::Spot { .. } => (light.position, frame.scale * frame.scale),
+    };
+    let bright = light.intensity.max_element() * factor > INTENSITY_MAX;
+    let bright = bright.then(|| format!("is brighter than {INTENSITY_MAX:e} in internal units"));
+    far(frame, position).or(bright)
+}
+
+/// What f32 could not hold of a camera.
+pub(super) fn camera_beyond(frame: &Frame, camera: &Camera) -> Option<String> {
+    let wide = match camera.lens {
+        Lens::Perspective { .. } => false,
+        Lens::Orthographic { xmag, ymag } => xmag.max(ymag) * frame.scale > COORDINATE_MAX,
+    };
+    let wide = wide.then(|| format!("sees more than {COORDINATE_MAX:e} times the translucent part's radius"));
+    far(frame, camera.eye).or(wide)
+}
+
+fn far(frame: &Frame, position: DVec3) -> Option<String> {
+    let reach = ((position - frame.centre) * frame.scale).abs().max_element();
+    (reach > COORDINATE_MAX).then(|| format!("is {reach:e} times as far as the translucent part's radius"))
 }
 
 fn vertices(triangle: &Triangle) -> [DVec3; 3] {

@@ -3,6 +3,7 @@
 mod accessor;
 mod bvh;
 mod camera;
+mod check;
 mod environment;
 mod frame;
 mod gltf;
@@ -22,6 +23,8 @@ mod unit;
 
 pub use presets::{Preset, preset, presets};
 pub use unit::parse_unit;
+
+pub(crate) use check::{check_camera, check_light};
 
 use crate::{
     Error, Result,

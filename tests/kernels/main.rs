@@ -8,6 +8,7 @@ mod common;
 mod math;
 mod models;
 mod overflow;
+mod recording;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
 mod scenes;

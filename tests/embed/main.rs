@@ -1,0 +1,6 @@
+//! The library inside somebody else's Vulkan application. Every test ends with a silent validation layer, after the device
+//! is gone.
+
+mod app;
+mod device;
+mod record;
