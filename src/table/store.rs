@@ -7,7 +7,7 @@ use super::white::{Curve, EXTENTS, Node, White};
 use sha2::{Digest, Sha256};
 
 /// Changes whenever the same parameters would give other bytes.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 const MAGIC: &[u8; 4] = b"TLWT";
 /// ln R of the codes 0 and 65535.
 const RANGE: (f64, f64) = (-80.0, 10.0);

@@ -7,9 +7,11 @@
 //! smooth in it: far from the entry ln R falls like -e r.
 //!
 //! # How noise is kept low
-//! In each cell ln R is replaced by the value of a parabola in ln r^2, fitted by least squares to it and three neighbours
-//! on each side, and carried from the cell's mean to its middle. Cells with a standard error above 15 % are
-//! continued: constant towards r = 0, in proportion to a diffusion dipole with the exact decay rate towards infinity.
+//! In each cell ln R is replaced by the value of a parabola in ln r^2, fitted by least squares to it and its neighbours,
+//! and carried from the cell's mean to its middle. On the half-space the parabola is fitted to what ln R exceeds that of
+//! a diffusion dipole with the exact decay rate by, which bends little: three neighbours on each side, eight where a
+//! cell's error exceeds 1 %. Cells with a standard error above 15 % are continued: towards r = 0 by the power of r of the
+//! cells that follow, between r^0 and r^-1 (what two collisions give), towards infinity in proportion to the dipole.
 //!
 //! # Between nodes
 //! ln R is a cubic in e and in ln r^2. Between the radii a1 < a < a2 of spheres, R is linear in 1/a, each part stretched
@@ -35,6 +37,8 @@ pub const EXTENTS: [f64; 25] = [
 ];
 /// Relative standard error above which a cell is continued from its neighbours.
 const NOISY: f64 = 0.15;
+/// Relative standard error from which on a cell of a half-space is smoothed over more neighbours.
+const ROUGH: f64 = 0.01;
 /// ln R of nothing.
 const NOTHING: f64 = -80.0;
 
@@ -292,7 +296,9 @@ fn smoothed(leaving: &Leaving, radius: f64, dipole: &Dipole) -> Curve {
         .iter()
         .map(|cell| if cell.mean > 0.0 { (cell.error / cell.mean).min(1.0) } else { 1.0 })
         .collect();
-    let raw = |cell: usize| (leaving.cells[cell].mean / area(cell)).max(1e-300).ln();
+    // Over the dipole's shape, which on the half-space has the same end, little bends.
+    let guide = |s: f64| if radius.is_finite() { 0.0 } else { dipole.shape(s.sqrt()).max(1e-300).ln() };
+    let raw = |cell: usize| (leaving.cells[cell].mean / area(cell)).max(1e-300).ln() - guide(middle(cell));
     let mut logarithm = vec![NOTHING; CELLS];
     let good: Vec<usize> = (0..reached).filter(|&cell| error[cell] > 0.0 && error[cell] <= NOISY).collect();
     let longest = good.chunk_by(|a, b| a + 1 == *b).max_by_key(|run| run.len()).map(|run| (run[0], run[run.len() - 1]));
@@ -300,17 +306,24 @@ fn smoothed(leaving: &Leaving, radius: f64, dipole: &Dipole) -> Curve {
         return Curve { total: Estimate::default(), diffuse: Estimate::default(), logarithm, error };
     };
     for cell in first..=last {
-        let window = cell.saturating_sub(3).max(first)..=(cell + 3).min(last);
-        let [c0, c1, c2] = parabola(window.map(|i| {
-            let x = (middle(i) / middle(cell)).ln();
-            (x, raw(i), 1.0 / (error[i] * error[i] + 1e-6))
-        }));
-        // The mean over a cell exceeds the middle by R'' (width)^2 / 24.
-        let width = area(cell) / PI / middle(cell);
-        logarithm[cell] = c0 - (width * width / 24.0 * (c1 * c1 - c1 + 2.0 * c2)).clamp(-0.5, 0.5).ln_1p();
+        let reach = if error[cell] > ROUGH && radius.is_infinite() { 8 } else { 3 };
+        let window = cell.saturating_sub(reach).max(first)..=(cell + reach).min(last);
+        let point = |i: usize| ((middle(i) / middle(cell)).ln(), raw(i), 1.0 / (error[i] * error[i] + 1e-6));
+        let [c0, c1, c2] = parabola(window.map(point));
+        // The mean over the cell, by Simpson's rule, is what was counted.
+        let curve = |s: f64| {
+            let x = (s / middle(cell)).ln();
+            (x * (c1 + x * c2) + guide(s) - guide(middle(cell))).exp()
+        };
+        let half = area(cell) / PI / 2.0;
+        let mean = (curve(middle(cell) - half) + 4.0 + curve(middle(cell) + half)) / 6.0;
+        logarithm[cell] = c0 + guide(middle(cell)) - mean.ln();
     }
+    // Towards the entry R is a power of r, from a constant to what two collisions give, 1/r.
+    let next = (first + 8).min(last);
+    let slope = (logarithm[next] - logarithm[first]) / (middle(next) / middle(first)).ln().max(1e-300);
     for cell in 0..first {
-        logarithm[cell] = logarithm[first];
+        logarithm[cell] = logarithm[first] + slope.clamp(-0.5, 0.0) * (middle(cell) / middle(first)).ln();
     }
     for cell in last + 1..reached {
         let [from, to] = [last, cell].map(|cell| dipole.shape(middle(cell).sqrt()).max(1e-300).ln());

@@ -1,7 +1,7 @@
 //! The tabulated profile: against independent simulations, its sampler, its store.
 
 use glam::DVec3;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 use translucent::reference::boundary::{Side, diffuse_reflectance};
 use translucent::reference::math::integrate;
 use translucent::reference::profile::{
@@ -15,6 +15,7 @@ use translucent::table::{
     single::Matter as Single,
     store,
     walk::{Incidence, Walk},
+    white::White,
 };
 
 const OPTIONS: Options = Options {
@@ -132,6 +133,58 @@ fn searchlight_is_that_of_an_independent_monte_carlo() {
         assert!(difference / energy < 0.01, "{}", difference / energy);
         assert!((profile.total() - light.total).abs() < 0.003 * light.total, "{} for {}", profile.total(), light.total);
     }
+}
+
+#[test]
+fn tables_of_forward_scattering_are_what_the_random_walk_gives() {
+    // alpha' = .9, g = .8, n = 1.4, lengths in 1 / sigma_t'; 4e6 paths of the independent walk.
+    const RINGS: [[f64; 3]; 20] = [
+        [0.05, 6.21162e-1, 4.4e-3],
+        [0.05 * SQRT_2, 2.43514e-1, 2.7e-3],
+        [0.1, 1.67551e-1, 1.6e-3],
+        [0.1 * SQRT_2, 1.19396e-1, 9.3e-4],
+        [0.2, 8.12077e-2, 5.4e-4],
+        [0.2 * SQRT_2, 5.65138e-2, 3.1e-4],
+        [0.4, 3.97401e-2, 1.8e-4],
+        [0.4 * SQRT_2, 2.78820e-2, 1.0e-4],
+        [0.8, 1.94028e-2, 6.0e-5],
+        [0.8 * SQRT_2, 1.29291e-2, 3.3e-5],
+        [1.6, 8.02756e-3, 1.8e-5],
+        [1.6 * SQRT_2, 4.48792e-3, 8.8e-6],
+        [3.2, 2.11703e-3, 3.9e-6],
+        [3.2 * SQRT_2, 7.99888e-4, 1.5e-6],
+        [6.4, 2.25050e-4, 4.9e-7],
+        [6.4 * SQRT_2, 4.35461e-5, 1.2e-7],
+        [12.8, 4.99281e-6, 2.1e-8],
+        [12.8 * SQRT_2, 2.98583e-7, 2.4e-9],
+        [25.6, 7.50446e-9, 1.6e-10],
+        [25.6 * SQRT_2, 5.47273e-11, 8.2e-12],
+    ];
+    const TOTAL: (f64, f64) = (0.244571, 1.52e-4);
+    let (albedo, scattering) = (0.9, 0.9);
+    let profile = White::simulate(1.4, 0.8, &[f64::INFINITY], |_| 1 << 15).profile(albedo, f64::INFINITY);
+    let total = profile.total();
+    assert!((total.mean - TOTAL.0).abs() < 4.0 * total.error.hypot(TOTAL.1), "{total:?}");
+    let (mut from, mut difference, mut energy, mut noise) = (0.0, 0.0, 0.0, 0.0);
+    for [to, expected, error] in RINGS {
+        let area = PI * (to * to - from * from);
+        let ring = |r: f64| 2.0 * PI * r * scattering * scattering * profile.value(scattering * r);
+        let mean = integrate(f64::max(from, 1e-9), to, 1, ring) / area;
+        // A ring has four cells; where they are all noise the profile is continued.
+        let own = profile.error(scattering * (from + to) / 2.0) * expected;
+        if own < 0.1 * expected {
+            let allowed = 5.0 * (own / 2.0).hypot(error);
+            assert!((mean - expected).abs() < allowed, "{to}: {mean} for {expected} +- {error}, own {own}");
+        }
+        difference += area * (mean - expected).abs();
+        energy += area * expected;
+        noise += area * (own / 2.0).hypot(error);
+        from = to;
+    }
+    assert!((energy - TOTAL.0).abs() < 5e-5, "the rings hold all light");
+    // The mean of |x| is .8 standard deviations; twice that is beyond any chance in twenty rings.
+    assert!(difference < 1.6 * noise, "{} of {}", difference / energy, noise / energy);
+    assert!(noise < 0.05 * energy, "no force at {}", noise / energy);
 }
 
 #[test]
