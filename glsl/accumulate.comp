@@ -53,57 +53,74 @@ void main() {
     Surface surface = surfaces[surface_index(index)];
     bool covered = surface.triangle != MISS;
     if (step_.count != 0) count_sample(index, covered);
-    Probe probe = probes[index];
-    uint count = hit_lists[index].count;
-    if (!covered || !(probe.t_min <= probe.t_max) || count == 0u || step_.ray_count == 0u) return;
+    if (!covered || step_.ray_count == 0u) return;
 
     View view = views[0];
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
+    if ((m.flags & TRANSLUCENT) == 0u) return;
     if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));
     uint batch = sample_index() % BATCHES;
 
-    // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir).
-    uint kept = min(count, MAX_HITS);
-    float cumulative[MAX_HITS];
-    float total = 0.0;
-    float shift = PROJECTION == PROJECTION_CAMERA ? m.camera_rate * probe.radius : 0.0;
-    for (uint j = 0; j < kept; j++) {
-        vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
-        uint triangle = hit_lists[index].triangle[j];
-        vec3 n = geometric_normal(triangles[triangle]);
-        Material local = textured_medium(m, triangle, weights(triangles[triangle], (s.position - triangles[triangle].corner) + delta));
-        vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift);
-        float p = 1.0;
-        if (PROJECTION == PROJECTION_CAMERA) {
-            f *= camera_factor(s, m, probe, delta, n);
-        } else {
-            p = mixture_density(s, m, delta, n);
-        }
-        total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
-        cumulative[j] = total;
-    }
-    if (!(total > 0.0)) return;
-    float threshold = unit(scramble(sample_point(DIM_HIT), dimension_key(key, batch, DIM_HIT))) * total;
-    uint chosen = 0;
-    for (uint j = 1; j < kept; j++) {
-        if (cumulative[j - 1] <= threshold && cumulative[j] > cumulative[j - 1]) chosen = j;
-    }
-
-    vec3 delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
-    uint lit = hit_lists[index].triangle[chosen];
-    Triangle triangle = triangles[lit];
-    vec3 n = s.side * geometric_normal(triangle);
-    vec2 barycentric = weights(triangle, (s.position - triangle.corner) + delta);
-    Material local = textured_medium(m, lit, barycentric);
-    float given = PROJECTION == PROJECTION_CAMERA ? camera_factor(s, m, probe, delta, n) : 1.0;
-    vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift) * given;
-    // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
+    // Where light enters. In the opaque limit that is where it leaves, and there are no probes.
+    vec3 delta = vec3(0.0);
+    uint lit = surface.triangle;
+    vec2 barycentric = surface.barycentric;
+    float shift = 0.0;
+    vec3 factor;
+    Material local;
     bool own_value = has_model(m, MODEL_DIRECTIONAL);
-    vec3 factor = (own_value ? vec3(given) : f) * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
+    if (has_model(m, MODEL_LAMBERT)) {
+        local = textured_medium(m, lit, barycentric);
+        factor = local.strength;
+        if (factor == vec3(0.0)) return;
+    } else {
+        Probe probe = probes[index];
+        uint count = hit_lists[index].count;
+        if (!(probe.t_min <= probe.t_max) || count == 0u) return;
 
+        // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir).
+        uint kept = min(count, MAX_HITS);
+        float cumulative[MAX_HITS];
+        float total = 0.0;
+        if (PROJECTION == PROJECTION_CAMERA) shift = m.camera_rate * probe.radius;
+        for (uint j = 0; j < kept; j++) {
+            vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
+            uint triangle = hit_lists[index].triangle[j];
+            vec3 n = geometric_normal(triangles[triangle]);
+            vec3 from_corner = (s.position - triangles[triangle].corner) + delta;
+            Material local = textured_medium(m, triangle, weights(triangles[triangle], from_corner));
+            vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift);
+            float p = 1.0;
+            if (PROJECTION == PROJECTION_CAMERA) {
+                f *= camera_factor(s, m, probe, delta, n);
+            } else {
+                p = mixture_density(s, m, delta, n);
+            }
+            total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
+            cumulative[j] = total;
+        }
+        if (!(total > 0.0)) return;
+        float threshold = unit(scramble(sample_point(DIM_HIT), dimension_key(key, batch, DIM_HIT))) * total;
+        uint chosen = 0;
+        for (uint j = 1; j < kept; j++) {
+            if (cumulative[j - 1] <= threshold && cumulative[j] > cumulative[j - 1]) chosen = j;
+        }
+
+        delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
+        lit = hit_lists[index].triangle[chosen];
+        barycentric = weights(triangles[lit], (s.position - triangles[lit].corner) + delta);
+        local = textured_medium(m, lit, barycentric);
+        float given = PROJECTION == PROJECTION_CAMERA
+            ? camera_factor(s, m, probe, delta, s.side * geometric_normal(triangles[lit])) : 1.0;
+        vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift) * given;
+        // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
+        factor = (own_value ? vec3(given) : f) * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
+    }
+
+    vec3 n = s.side * geometric_normal(triangles[lit]);
     vec3 shading_n = s.side * shading_normal(shadings[lit], lit, barycentric);
     vec3 position = s.position + delta;
 
@@ -161,14 +178,14 @@ void main() {
         }
         if (open && hit_count == 0u) {
             light *= crossing(m, cos_shading);
-            if (has_model(m, MODEL_TABLE)) light *= table_obliqueness(m, cos_shading, false);
+            light *= obliqueness(m, cos_shading, false);
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }
     }
 
-    vec3 radiance = crossing(m, dot(s.shading_normal, s.wo)) * factor * entering;
-    if (has_model(m, MODEL_TABLE)) radiance *= table_obliqueness(m, dot(s.shading_normal, s.wo), true);
+    float cos_eye = dot(s.shading_normal, s.wo);
+    vec3 radiance = crossing(m, cos_eye) * obliqueness(m, cos_eye, true) * factor * entering;
     // The base colour tints what crosses the surface, there and here.
     if (has_texture(TEXTURE_BASE_COLOR)) {
         radiance *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb

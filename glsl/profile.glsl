@@ -42,6 +42,13 @@ float radial_density(Material m, float r2) {
     return dot(m.density, shape(m, r2));
 }
 
+// Factor on light that enters, or leaves, at the cosine outside.
+vec3 obliqueness(Material m, float c, bool leaving) {
+    if (has_model(m, MODEL_TABLE)) return table_obliqueness(m, table_slope(m), c, leaving);
+    if (has_model(m, MODEL_LAMBERT)) return table_obliqueness(m, m.slope, c, leaving);
+    return vec3(1.0);
+}
+
 // Radius with that density.
 float draw_radius(Material m, float u_component, float u_radius) {
     if (has_model(m, MODEL_TABLE)) return table_radius(m, u_component, u_radius);

@@ -137,10 +137,15 @@ float table_radius(Material m, float u_component, float u) {
     return table_unbent(s0 + t * width, bend);
 }
 
-// Factor on light that enters, or leaves, at the cosine outside.
-vec3 table_obliqueness(Material m, float c, bool leaving) {
+// Slope of the total in 1 - cosine of refraction.
+vec3 table_slope(Material m) {
     vec3 slope = table_weight * table_vector(m, table_node, 5u);
     if (CURVATURE != 0 && table_weight < 1.0) slope += (1.0 - table_weight) * table_vector(m, table_node + 1u, 5u);
+    return slope;
+}
+
+// Factor on light that enters, or leaves, at the cosine outside.
+vec3 table_obliqueness(Material m, vec3 slope, float c, bool leaving) {
     float inside = sqrt(max(1.0 - (1.0 - c * c) / (m.ior * m.ior), 0.0));
     vec3 factor = 1.0 + slope * (1.0 - inside);
     return leaving ? factor / (1.0 + slope * m.obliqueness) : factor;

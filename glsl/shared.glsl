@@ -51,6 +51,8 @@ const uint MODEL_DIRECTIONAL = 2u;
 const uint MODEL_BURLEY = 3u;
 // Model: profiles tabulated by simulation.
 const uint MODEL_TABLE = 4u;
+// Model: the opaque limit, where light leaves where it entered.
+const uint MODEL_LAMBERT = 5u;
 // Bits of an f32 below those that number a cell of a tabulated profile.
 const uint TABLE_SHIFT = 21u;
 // Numbers before a table's values at each curvature.
@@ -151,7 +153,7 @@ layout(constant_id = 6) const uint EMISSIVE = 0;
 layout(constant_id = 9) const uint ROUGH = 0;
 // Bit k is set where a material has a texture of kind k (TEXTURE_*).
 layout(constant_id = 7) const uint TEXTURED = 0;
-// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
+// Bit 1 << MODEL_X for each model X of the translucent materials that the scene shows.
 layout(constant_id = 5) const uint MODELS = 0;
 // 1 where profiles depend on the curvature of the surface that is seen.
 layout(constant_id = 10) const uint CURVATURE = 0;
@@ -300,7 +302,8 @@ struct Material {
     vec3 strength;
     // Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
     vec3 density;
-    // Cumulative probability of the sampler's nine components, three of each channel; see `reference::profile`.
+    // Cumulative probability of the sampler's nine components, three of each channel; see `reference::profile`. All 0
+    // where no radius is drawn.
     float component_cdf[9];
     // One of MODEL_*.
     uint model;
@@ -328,8 +331,10 @@ struct Material {
     uint table_first;
     uint table_cells;
     uint table_nodes;
-    // Table: mean of 1 - cosine of refraction over diffuse light that enters.
+    // Table, and its opaque limit: mean of 1 - cosine of refraction over diffuse light that enters.
     float obliqueness;
+    // Opaque limit of a table: slope of the total in 1 - cosine of refraction.
+    vec3 slope;
     // Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
     uint flags;
     // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.

@@ -9,6 +9,7 @@ use crate::{
     scene::{EnvironmentMap, Lens, LightKind, Material, Medium, Scene},
     settings::{Model, Settings},
     shared::Slot,
+    table,
 };
 use glam::DVec3;
 use serde_json::{Value, json};
@@ -44,8 +45,12 @@ pub struct MatterReport {
     /// The model of the profile, and why it.
     pub model: Model,
     pub why: String,
+    /// Of a Lambert surface, the model whose total it has; else the model.
+    pub limit_of: Model,
     /// What would be recommended.
     pub recommended: Choice,
+    /// Mean cosines whose tables at the material's index are not shipped, but simulated when first needed.
+    pub simulated: Vec<f64>,
     /// Error of the model on a plane, in the channel where it is largest.
     pub error: Option<model::errors::Error>,
     /// Whether light that was scattered once is added to the model's.
@@ -71,14 +76,23 @@ impl MatterReport {
         let extinction = sigma_s_prime + sigma_a;
         let choice = advice.choice.clone();
         let total = |c: usize| {
-            let constant = profile::constant(choice.model)?;
+            let constant = profile::constant(choice.limit_of)?;
             Some(Profile::new(constant, &Coefficients::of(medium, ior, c)).total())
         };
+        let mut simulated = vec![];
+        if choice.limit_of == Model::Table {
+            let scattering = (0..3).filter(|&c| sigma_s_prime[c] > 0.0 && !table::is_shipped(ior, medium.g[c]));
+            simulated.extend(scattering.map(|c| medium.g[c]));
+            simulated.sort_by(f64::total_cmp);
+            simulated.dedup();
+        }
         MatterReport {
             source: medium.source.clone(),
             model: choice.model,
             why: choice.why,
+            limit_of: choice.limit_of,
             recommended: advice.recommended.clone(),
+            simulated,
             error: advice.error,
             single_scattering: model::adds_single_scattering(settings, medium, choice.model),
             sigma_s_prime,
@@ -186,6 +200,8 @@ fn material(report: &MaterialReport) -> Value {
             "source": matter.source,
             "model": matter.model.to_string(),
             "why": matter.why,
+            "limitOf": matter.limit_of.to_string(),
+            "simulatedG": matter.simulated,
             "recommended": {"model": matter.recommended.model.to_string(), "why": matter.recommended.why},
             "error": matter.error.map(|error| json!({"total": error.total, "l1": error.l1})),
             "singleScattering": matter.single_scattering,

@@ -35,6 +35,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    program::log::start();
     let result = match Cli::parse().command {
         Command::Render(render) => render.run(),
         Command::Inspect(inspect) => inspect.run(),

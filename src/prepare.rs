@@ -3,17 +3,19 @@
 use crate::{
     curvature,
     error::{Error, Result},
-    model::{self, Advice},
+    model::{self, Advice, Choice, Detail},
     reference::{
         Inputs, emitter, light,
-        profile::{self, Coefficients, Dipole, Radial},
+        profile::{self, Coefficients, Dipole, Radial, lambert},
         rough::Boundaries,
         single::Scattering,
         texture,
     },
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Set, Wrap},
     settings::{Model, Projection, Settings},
-    shared::{self, Emitter, Features, Light, Material, TABLE_NODES, TRANSLUCENT, TWO_SIDED, Texture, View},
+    shared::{
+        self, Emitter, Features, Light, MODEL_LAMBERT, Material, TABLE_NODES, TRANSLUCENT, TWO_SIDED, Texture, View,
+    },
 };
 use glam::{DVec3, Vec3};
 
@@ -43,8 +45,10 @@ pub struct Prepared {
     pub camera: Camera,
     /// Rows that are rendered: from the first, exclusive of the last.
     pub rows: std::ops::Range<u32>,
-    /// Whether any material scatters light: otherwise the three kernels do not run.
+    /// Whether any material that is shown scatters light: otherwise `accumulate` does not run.
     pub has_translucent: bool,
+    /// Whether any of those is not in the opaque limit: otherwise `sample` and `reproject` do not run either.
+    pub has_probes: bool,
     /// Whether light that was scattered once is added to a material's.
     pub has_single: bool,
     /// Whether light can leave a first surface without having entered it, or the environment is shown: otherwise
@@ -139,8 +143,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
 
     let frame = scene.frame;
     let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
-    let footprint = footprint(&camera, frame, height);
-    let advice: Vec<_> = scene.materials.iter().map(|m| model::advise(settings, m, footprint)).collect();
+    let details = Detail::of(scene, &camera, height);
+    let advice: Vec<_> = scene.materials.iter().zip(details).map(|(m, d)| model::advise(settings, m, d)).collect();
     let thickness = thickness(scene, settings, &advice);
     let (mut profiles, mut boundaries) = (vec![], Boundaries::default());
     let materials = materials(scene, settings, &advice, &thickness, &mut profiles, &mut boundaries)?;
@@ -183,10 +187,11 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     }
 
     let (texels, textures, kinds) = textures(scene);
-    let used = |flag: bool| scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_some() == flag);
+    let opaque = scene.sets.iter().any(|set| scene.materials[set.materials[0]].medium.is_none());
     let rough = scene.materials.iter().any(|m| m.roughness > 0.0);
-    let translucent = materials.iter().filter(|material| material.flags & TRANSLUCENT != 0);
-    let models = translucent.fold(0, |mask, material| mask | 1 << material.model);
+    let shown = scene.sets.iter().flat_map(|set| &set.materials).map(|&index| &materials[index]);
+    let translucent = shown.filter(|material| material.flags & TRANSLUCENT != 0);
+    let models: u32 = translucent.fold(0, |mask, material| mask | 1 << material.model);
     let emits = !emitters.is_empty();
     let features = Features {
         projection: settings.projection as u32,
@@ -205,8 +210,9 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         view,
         has_single: materials.iter().any(|material| material.scattering != Vec3::ZERO),
         materials,
-        has_translucent: used(true),
-        has_reflection: used(false)
+        has_translucent: models != 0,
+        has_probes: models & !(1 << MODEL_LAMBERT) != 0,
+        has_reflection: opaque
             || emits
             || settings.show_environment
             || kind != shared::ENVIRONMENT_NONE
@@ -226,15 +232,6 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         camera,
         rows: y0..y1,
     })
-}
-
-/// Width of a pixel where the translucent part comes nearest to the eye (m); 0 if it may touch it.
-fn footprint(camera: &Camera, frame: Frame, height: u32) -> f64 {
-    let distance = (frame.centre - camera.eye).length() - 1.0 / frame.scale;
-    match camera.lens {
-        Lens::Perspective { yfov, .. } => 2.0 * (0.5 * yfov).tan() * distance.max(0.0) / f64::from(height),
-        Lens::Orthographic { ymag, .. } => 2.0 * ymag / f64::from(height),
-    }
 }
 
 /// The camera's part of a View, in internal units.
@@ -312,25 +309,23 @@ fn materials(
     profiles: &mut Vec<f32>,
     boundaries: &mut Boundaries,
 ) -> Result<Vec<Material>> {
-    let chosen = |advice: &Option<Advice>| {
-        let model = advice.as_ref().map_or(settings.model, |advice| advice.choice.model);
-        Settings { model, ..settings.clone() }
-    };
+    let choice = |advice: &'_ Option<Advice>| advice.as_ref().map(|advice| advice.choice.clone());
     let each = |(m, advice): (&scene::Material, &Option<Advice>)| {
-        material(m, scene.frame, &chosen(advice), thickness, profiles, boundaries)
+        material(m, choice(advice), scene.frame, settings, thickness, profiles, boundaries)
     };
     let mut out = scene.materials.iter().zip(advice).map(each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
         out[index].ramp = out.len() as u32;
         let whole = out[index];
-        if whole.model == shared::MODEL_TABLE {
+        let choice = choice(&advice[index]);
+        if choice.as_ref().is_some_and(|choice| choice.limit_of == Model::Table) {
             out.extend(totals(authored).map(|total| Material { strength: whole.strength * total, ..whole }));
             continue;
         }
         let first = out.len();
         for medium in &authored.ramp {
             let node = scene::Material { medium: Some(medium.clone()), ..authored.clone() };
-            out.push(material(&node, scene.frame, &chosen(&advice[index]), thickness, profiles, boundaries)?);
+            out.push(material(&node, choice.clone(), scene.frame, settings, thickness, profiles, boundaries)?);
         }
         // Black matter has no lengths of its own.
         let mut next = out[first + 1];
@@ -366,22 +361,20 @@ pub(crate) fn replaced(
     if !(numbers && surface && (0.1..=10.0).contains(&new.ior)) {
         return refuse("a number is out of its range");
     }
-    let advice = prepared.advice[index].as_ref();
-    let model = advice.map_or(settings.model, |advice| advice.choice.model);
+    let choice = prepared.advice[index].as_ref().map(|advice| advice.choice.clone());
     let translucent = new.medium.is_some();
     if of(old) != of(new) || old.textures != new.textures || !old.ramp.is_empty() {
         return refuse("another kind of matter, emission, texture or set needs a new renderer");
     }
-    if translucent && model == Model::Table {
+    if choice.as_ref().is_some_and(|choice| choice.limit_of == Model::Table) {
         return refuse("the table model's profile is simulated for its matter; another needs a new renderer");
     }
     let same_boundary = old.roughness == new.roughness && (old.ior == new.ior || old.roughness == 0.0);
     if translucent && !same_boundary || (old.roughness > 0.0) != (new.roughness > 0.0) {
         return refuse("another rough boundary needs a new renderer");
     }
-    let settings = Settings { model, ..settings.clone() };
     let mut boundaries = Boundaries::default();
-    let mut made = material(new, frame, &settings, &[], &mut vec![], &mut boundaries)?;
+    let mut made = material(new, choice, frame, settings, &[], &mut vec![], &mut boundaries)?;
     // The same roughness and index have the same table.
     let before = &prepared.materials[index];
     made.boundary = before.boundary;
@@ -492,6 +485,7 @@ fn spheres(thickness: &[Vec3], channels: &[Coefficients; 3]) -> Vec<i32> {
 
 fn material(
     material: &scene::Material,
+    choice: Option<Choice>,
     frame: Frame,
     settings: &Settings,
     thickness: &[Vec3],
@@ -500,12 +494,10 @@ fn material(
 ) -> Result<Material> {
     let alpha = material.roughness * material.roughness;
     let alpha = if alpha < f64::from(shared::MIRROR_ALPHA) { 0.0 } else { alpha as f32 };
-    let mut out = match &material.medium {
+    let mut out = match material.medium.as_ref().zip(choice) {
         None => Material::default(),
-        Some(medium) => {
-            let model = model::resolve(settings, medium).model;
-            let constant = profile::constant(model)
-                .ok_or_else(|| Error::setting("model", format!("the {model} model is not built yet")))?;
+        Some((medium, choice)) => {
+            let constant = |model: Model| profile::constant(model).expect("a choice is a built model");
             let rough = (alpha > 0.0).then(|| boundaries.add(alpha.into(), material.ior));
             let coefficients = [0, 1, 2].map(|c| Coefficients {
                 rough: rough.map(|(_, reflectance)| reflectance),
@@ -516,14 +508,16 @@ fn material(
                 radius_tail: settings.radius_tail,
                 directional: settings.directional,
             };
-            let mut out = if constant == shared::MODEL_TABLE {
-                profile::tabulated(&coefficients, options, &spheres(thickness, &coefficients), profiles)
-            } else {
-                profile::material(constant, &coefficients, options)
+            let mut out = match choice.model {
+                Model::Table => {
+                    profile::tabulated(&coefficients, options, &spheres(thickness, &coefficients), profiles)
+                }
+                Model::Lambert => lambert::limit(constant(choice.limit_of), &coefficients, options),
+                model => profile::material(constant(model), &coefficients, options),
             };
             out.radius_max = out.radius_max.min(SET_DIAMETER);
             out.boundary = rough.map_or(0, |(table, _)| table);
-            if model::adds_single_scattering(settings, medium, model) {
+            if model::adds_single_scattering(settings, medium, choice.model) {
                 let vector = |value: fn(&Coefficients) -> f64| glam::DVec3::from(coefficients.each_ref().map(value));
                 let scattering = Scattering::new(vector(|c| c.sigma_s_prime), vector(|c| c.sigma_a), vector(|c| c.g));
                 out.extinction = scattering.extinction.as_vec3();

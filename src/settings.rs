@@ -29,7 +29,8 @@ pub enum Normalisation {
 /// How light spreads in translucent matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Model {
-    /// What the material's file names, else what is recommended for its matter.
+    /// What the material's file names, else what is recommended for its matter and the picture; see
+    /// [`model`](crate::model).
     #[default]
     Auto,
     /// Standard dipole: H. W. Jensen et al., SIGGRAPH 2001.
@@ -43,17 +44,21 @@ pub enum Model {
     Burley,
     /// Profiles tabulated by simulation.
     Table,
+    /// The opaque limit: light leaves where it entered. Its total is that of the standard dipole, or of the profile that
+    /// would else be recommended where `Auto` finds it enough.
+    Lambert,
 }
 
 impl Model {
     /// Every model, with its name in files and on the command line.
-    pub const NAMES: [(Model, &str); 6] = [
+    pub const NAMES: [(Model, &str); 7] = [
         (Model::Auto, "auto"),
         (Model::Standard, "standard"),
         (Model::Better, "better"),
         (Model::Directional, "directional"),
         (Model::Burley, "burley"),
         (Model::Table, "table"),
+        (Model::Lambert, "lambert"),
     ];
 }
 

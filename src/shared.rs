@@ -217,6 +217,8 @@ constants! {
     MODEL_BURLEY: u32 = 3;
     /// Model: profiles tabulated by simulation.
     MODEL_TABLE: u32 = 4;
+    /// Model: the opaque limit, where light leaves where it entered.
+    MODEL_LAMBERT: u32 = 5;
     /// Bits of an f32 below those that number a cell of a tabulated profile.
     TABLE_SHIFT: u32 = 21;
     /// Numbers before a table's values at each curvature.
@@ -453,7 +455,8 @@ structs! {
         strength: Vec3,
         /// Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
         density: Vec3,
-        /// Cumulative probability of the sampler's nine components, three of each channel; see `reference::profile`.
+        /// Cumulative probability of the sampler's nine components, three of each channel; see `reference::profile`. All 0
+        /// where no radius is drawn.
         component_cdf: [f32; 9],
         /// One of MODEL_*.
         model: u32,
@@ -481,8 +484,10 @@ structs! {
         table_first: u32,
         table_cells: u32,
         table_nodes: u32,
-        /// Table: mean of 1 - cosine of refraction over diffuse light that enters.
+        /// Table, and its opaque limit: mean of 1 - cosine of refraction over diffuse light that enters.
         obliqueness: f32,
+        /// Opaque limit of a table: slope of the total in 1 - cosine of refraction.
+        slope: Vec3,
         /// Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
         flags: u32,
         /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
@@ -677,7 +682,7 @@ features! {
     rough = 9: ROUGH,
     /// Bit k is set where a material has a texture of kind k (TEXTURE_*).
     textures = 7: TEXTURED,
-    /// Bit 1 << MODEL_X for each model X of the scene's translucent materials; 0 is the standard dipole alone.
+    /// Bit 1 << MODEL_X for each model X of the translucent materials that the scene shows.
     models = 5: MODELS,
     /// 1 where profiles depend on the curvature of the surface that is seen.
     curvature = 10: CURVATURE,

@@ -3,7 +3,7 @@
 use super::{MM, scenes};
 use crate::{
     error::{Error, Result},
-    model,
+    model::{self, Detail},
     reference::{
         boundary::{Side, diffuse_reflectance, transmittance},
         profile::{self, Coefficients, Profile},
@@ -34,7 +34,7 @@ impl Matter {
     /// From the contents of `extras.bssrdf`, with a model other than what those ask for unless it is [`Model::Auto`].
     ///
     /// # Errors
-    /// As loading a file with that material, and for a model that is not built.
+    /// As loading a file with that material, and for the opaque limit, which has no profile.
     pub fn new(name: &str, bssrdf: Value, model: Model) -> Result<Matter> {
         let mut bssrdf = bssrdf;
         bssrdf["surface"] = json!("smooth");
@@ -45,13 +45,16 @@ impl Matter {
         let file = scenes::gltf(&[(mesh, 0)], &[material.clone()], &[], &eye);
         let mut scene = Scene::from_bytes(name, file.to_string().as_bytes(), &LoadOptions::default())?;
         let read = scene.materials.remove(0);
-        let medium = read.medium.expect("a material with extras.bssrdf has a medium");
+        let medium = read.medium.clone().expect("a material with extras.bssrdf has a medium");
         if medium.sigma_s_prime.min_element() <= 0.0 {
             return Err(Error::setting("matter", "must scatter in every channel to be measured"));
         }
-        let model = model::resolve(&Settings { model, ..Settings::default() }, &medium).model;
-        let constant =
-            profile::constant(model).ok_or_else(|| Error::setting("model", format!("{model} is not built yet")))?;
+        let settings = Settings { model, ..Settings::default() };
+        let model = model::advise(&settings, &read, Detail::ALL).expect("it has a medium").choice.model;
+        if model == Model::Lambert {
+            return Err(Error::setting("model", "the opaque limit has no profile that could be measured"));
+        }
+        let constant = profile::constant(model).expect("a choice is a built model");
         Ok(Matter { name: name.into(), material, medium, ior: read.ior, model, constant })
     }
 

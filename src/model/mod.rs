@@ -1,19 +1,24 @@
 //! Which profile a material gets, and why: the setting, else what its file says, else what is recommended.
 //!
 //! # What is recommended
-//! What the scene requires, no more. Of the models that are built, with the [errors](errors) that a random walk shows:
+//! What the scene requires, no more, by the [errors](errors) that a random walk shows:
 //!
 //! - The error that a pixel can show is the model's error of the total, and of the light that it puts in the wrong place
 //!   the part min(1, m / p) that crosses a pixel of width p, where m is the mean distance that light travels inside.
 //! - The diffusion model with the least such error is enough where that is at most [`ENOUGH`].
 //! - Else the tabulated profile.
+//! - Where no pixel shows the profile at all, and light crosses no wall, its opaque limit takes its place.
 //!
 //! # How light spreads below a pixel
 //! Across the edge of a shadow, m / pi of the light of a unit of its length changes sides (the mean of |x| is 2 m / pi
-//! for a radial profile, and half of it lies on either side), so of the light in the pixel m / (pi p).
+//! for a radial profile, and half of it lies on either side), so of the light in the pixel m / (pi p). The same for a
+//! wall of the thickness t in place of p: without absorption that share of the light, roughly, comes out behind it.
 
+mod detail;
 pub mod errors;
 mod grid;
+
+pub use detail::Detail;
 
 use crate::reference::boundary::{Side, diffuse_reflectance};
 use crate::reference::math::integrate;
@@ -23,9 +28,6 @@ use crate::settings::{Model, Settings, SingleScattering};
 use errors::Error;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
-
-/// Whether `auto` follows the recommendation, or is the standard dipole.
-const RECOMMENDED: bool = false;
 
 /// Error that a diffusion model may show.
 const ENOUGH: f64 = 0.05;
@@ -41,6 +43,8 @@ const WARNED: Error = Error { total: 0.1, l1: 0.5 };
 pub struct Choice {
     /// Never [`Model::Auto`].
     pub model: Model,
+    /// Of the opaque limit, the model whose limit it is, and so whose total it has; else the same.
+    pub limit_of: Model,
     /// Who chose it, for people.
     pub why: String,
 }
@@ -57,24 +61,25 @@ pub struct Advice {
     pub warning: Option<String>,
 }
 
-/// The model of a medium, where nothing is known of the picture.
-pub fn resolve(settings: &Settings, medium: &Medium) -> Choice {
-    let asked = |model: Option<Model>, why: &str| {
-        model.filter(|&model| model != Model::Auto).map(|model| Choice { model, why: why.into() })
-    };
-    asked(Some(settings.model), "as the settings ask").or_else(|| asked(medium.model, "as the file asks")).unwrap_or(
-        Choice { model: Model::Standard, why: "the standard dipole unless something else is asked for".into() },
-    )
-}
-
-/// The model of a material whose nearest pixels are `footprint` wide (m); none for an opaque one.
-pub fn advise(settings: &Settings, material: &Material, footprint: f64) -> Option<Advice> {
+/// The model of a material that shows this much of it; none for an opaque one.
+pub fn advise(settings: &Settings, material: &Material, detail: Detail) -> Option<Advice> {
     let medium = material.medium.as_ref()?;
     let channels: Vec<Coefficients> = (0..3).map(|c| Coefficients::of(medium, material.ior, c)).collect();
-    let recommended = recommend(&channels, footprint);
-    let asked = settings.model != Model::Auto || medium.model.is_some_and(|model| model != Model::Auto);
-    let choice = if RECOMMENDED && !asked { recommended.clone() } else { resolve(settings, medium) };
-    let error = worst(&channels, choice.model);
+    let recommended = recommend(&channels, detail);
+    let asked = |model: Option<Model>, why: &str| {
+        let model = model.filter(|&model| model != Model::Auto)?;
+        let limit_of = if model == Model::Lambert { Model::Standard } else { model };
+        Some(Choice { model, limit_of, why: why.into() })
+    };
+    let choice = asked(Some(settings.model), "as the settings ask")
+        .or_else(|| asked(medium.model, "as the file asks"))
+        .unwrap_or_else(|| recommended.clone());
+    let error = worst(&channels, choice.limit_of, |error| error.l1).map(|error| match choice.model {
+        // All light is where it entered, which does not show, or is all in the wrong place.
+        Model::Lambert if hidden(spread(&channels), detail) => Error { l1: error.total.abs(), ..error },
+        Model::Lambert => Error { l1: 2.0 + error.total, ..error },
+        _ => error,
+    });
     let warning = error.filter(|error| error.l1 > WARNED.l1 || error.total.abs() > WARNED.total).map(|error| {
         let (name, model) = (&material.name, choice.model);
         let advice =
@@ -84,42 +89,59 @@ pub fn advise(settings: &Settings, material: &Material, footprint: f64) -> Optio
     Some(Advice { choice, recommended, error, warning })
 }
 
-/// What `auto` means for matter in pixels of this width (m).
-fn recommend(channels: &[Coefficients], footprint: f64) -> Choice {
-    let spread = channels.iter().map(mean_distance).fold(0.0, f64::max);
-    let seen = |error: Error| {
+/// What `auto` means for matter that shows this much.
+fn recommend(channels: &[Coefficients], detail: Detail) -> Choice {
+    if detail.pixel == f64::INFINITY {
+        let why = "nothing of it is in front of the camera".into();
+        return Choice { model: Model::Lambert, limit_of: Model::Standard, why };
+    }
+    let spread = spread(channels);
+    let crossing = if detail.pixel > 0.0 { (spread / detail.pixel).min(1.0) } else { 1.0 };
+    let seen = |error: &Error| {
         let total = error.total.abs();
-        total + (error.l1 - total).max(0.0) * (spread / footprint).min(1.0)
+        total + (error.l1 - total).max(0.0) * crossing
     };
     let diffusion = [Model::Standard, Model::Better, Model::Burley];
-    let known = diffusion.into_iter().filter_map(|model| Some((model, worst(channels, model)?)));
-    let Some((model, error)) = known.min_by(|a, b| seen(a.1).total_cmp(&seen(b.1))) else {
-        return Choice { model: Model::Standard, why: "matter that does not scatter has no profile".into() };
+    let known = diffusion.into_iter().filter_map(|model| Some((model, seen(&worst(channels, model, seen)?))));
+    let Some((least, error)) = known.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let why = "matter that does not scatter has no profile".into();
+        return Choice { model: Model::Standard, limit_of: Model::Standard, why };
     };
-    let hidden = spread < UNSEEN * PI * footprint;
-    let shown = format!(
-        "in pixels of {}, light that travels {} on average shows {:.0} % of error{}",
-        length(footprint),
-        length(spread),
-        100.0 * seen(error),
-        if hidden { ", and looks as if it left where it entered" } else { "" }
-    );
-    if seen(error) <= ENOUGH || profile::constant(Model::Table).is_none() {
-        Choice { model, why: format!("the diffusion model that errs least: {shown}") }
-    } else {
-        Choice { model: Model::Table, why: format!("diffusion is not enough: {shown} with {model}") }
+    let picture = match detail.pixel {
+        0.0 => String::new(),
+        pixel => format!("in pixels of {}, ", length(pixel)),
+    };
+    let shown = format!("light that travels {} on average shows {:.0} % of error", length(spread), 100.0 * error);
+    let (model, reason) = match error <= ENOUGH {
+        true => (least, format!("the diffusion model that errs least: {picture}{shown}")),
+        false => (Model::Table, format!("diffusion is not enough: {picture}{shown} with {least}")),
+    };
+    if hidden(spread, detail) {
+        let why = format!("{picture}light that travels {} on average leaves where it entered", length(spread));
+        return Choice { model: Model::Lambert, limit_of: model, why: format!("{why}; total of the {model} model") };
     }
+    Choice { model, limit_of: model, why: reason }
+}
+
+/// Whether nothing shows of light that travels this far (m) on average.
+fn hidden(distance: f64, detail: Detail) -> bool {
+    distance < UNSEEN * PI * detail.pixel.min(detail.thickness)
+}
+
+/// The mean distance that light travels in the channel where it travels farthest.
+fn spread(channels: &[Coefficients]) -> f64 {
+    channels.iter().map(mean_distance).fold(0.0, f64::max)
 }
 
 /// The error of the channel in which a model errs most; none if it is not built, not known, or nothing scatters.
-fn worst(channels: &[Coefficients], model: Model) -> Option<Error> {
+fn worst(channels: &[Coefficients], model: Model, how_much: impl Fn(&Error) -> f64) -> Option<Error> {
     profile::constant(model)?;
     let scattering = channels.iter().filter(|channel| channel.sigma_s_prime > 0.0);
     let errors = scattering.map(|channel| {
         let albedo = channel.sigma_s_prime / (channel.sigma_s_prime + channel.sigma_a);
         errors::of(model, albedo, channel.ior)
     });
-    errors.collect::<Option<Vec<_>>>()?.into_iter().max_by(|a, b| a.l1.total_cmp(&b.l1))
+    errors.collect::<Option<Vec<_>>>()?.into_iter().max_by(|a, b| how_much(a).total_cmp(&how_much(b)))
 }
 
 /// Mean distance between where light enters and leaves a plane, by the standard dipole; but for the millionth that goes

@@ -9,7 +9,7 @@ use crate::reference::walk::mesh::Corners;
 use crate::reference::walk::model::Transfer;
 use crate::reference::walk::shape::Site;
 use crate::settings::{Model, Normalisation};
-use crate::shared::{self, MODEL_TABLE};
+use crate::shared::{self, MODEL_LAMBERT, MODEL_TABLE};
 use crate::table::SPHERES;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -31,7 +31,7 @@ pub fn models(matter: &Matter, scene: Option<&Scene>) -> Vec<Named> {
         appearance: None,
     };
     let transfer = |&(model, name): &(Model, &'static str)| -> Option<Named> {
-        let constant = constant(model)?;
+        let constant = constant(model).filter(|&constant| constant != MODEL_LAMBERT)?;
         if constant == MODEL_TABLE {
             return Some((name, Box::new(Table::new(&coefficients, Vec::new()))));
         }

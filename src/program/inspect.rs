@@ -12,6 +12,7 @@ use translucent::{
     inspect::{Inspection, MatterReport, environment, light_kind, light_unit},
     render::{Limits, value_name},
     scene::{Lens, Set},
+    table::cache,
 };
 
 #[derive(clap::Args)]
@@ -108,6 +109,15 @@ fn materials(inspection: &Inspection) -> String {
                 let _ = writeln!(text, ", {}", matter.source);
                 let single = if matter.single_scattering { " + single scattering" } else { "" };
                 let _ = writeln!(text, "    model {}{single}: {}", matter.model, matter.why);
+                if !matter.simulated.is_empty() {
+                    let g = matter.simulated.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+                    let kept = match cache::folder() {
+                        Some(folder) => format!("kept in {}", folder.display()),
+                        None => "not kept".into(),
+                    };
+                    let _ =
+                        writeln!(text, "    its table (g {g}) is not shipped, but simulated at first use and {kept}");
+                }
                 if let Some(error) = matter.error {
                     let _ = writeln!(text, "    a plane {error}");
                 }

@@ -48,7 +48,7 @@ pub struct Measure {
     #[arg(long, value_name = "G", allow_negative_numbers = true)]
     g: Option<f64>,
     /// Models to compare, separated by commas; with several, the green channel is shown.
-    #[arg(long, value_name = "MODEL,...", default_value = "auto", value_delimiter = ',', value_parser = super::scene::models())]
+    #[arg(long, value_name = "MODEL,...", default_value = "standard", value_delimiter = ',', value_parser = super::scene::models())]
     model: Vec<Model>,
     /// Factor on the number of samples; standard errors fall with its square root.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = arguments::positive)]

@@ -2,6 +2,7 @@
 
 pub mod arguments;
 pub mod inspect;
+pub mod log;
 pub mod measure;
 pub mod merge;
 pub mod plot;

@@ -1,6 +1,6 @@
 //! `render`: a glTF scene becomes an EXR image, and a PNG where one is asked for.
 
-use super::{Failure, INTERRUPTED, arguments, print, scene::SceneOptions};
+use super::{Failure, INTERRUPTED, arguments, log, print, scene::SceneOptions};
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::{
@@ -53,13 +53,16 @@ pub struct Render {
     /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
     #[arg(long, value_name = "INDEX|NAME|UUID")]
     device: Option<String>,
-    /// No progress and no warnings.
+    /// No progress, notes or warnings.
     #[arg(long)]
     quiet: bool,
 }
 
 impl Render {
     pub fn run(self) -> Result<ExitCode, Failure> {
+        if self.quiet {
+            log::quiet();
+        }
         let output = self.output()?;
         let stop = stop_on_interrupt()?;
         let (scene, warnings) = self.scene.load().map_err(Failure::while_reading)?;

@@ -17,6 +17,9 @@
 //!   Lo ~ 1 / N * sum of Ft(wo) f E (2 pi r / s) e^(s r) J,   J = |no.d| / |n.d| / q^2.
 //!
 //! The exponentials of density and profile are one, so that neither overflows.
+//!
+//! # The opaque limit
+//! Nothing is drawn: the entry is xo itself, and f / p the material's strength ([`profile::lambert`]).
 
 use super::light::{self, FAR};
 use super::math::cosine_direction;
@@ -29,8 +32,9 @@ use super::sample::coordinate;
 use super::sums::Contribution;
 use super::{Inputs, emitter, intersect, texture};
 use crate::shared::{
-    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, MODEL_DIRECTIONAL,
-    Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
+    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, MISS,
+    MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
+    TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -85,24 +89,30 @@ pub fn accumulate(
     probe: &Probe,
     hits: &Hits,
 ) -> Contribution {
-    if hits.count == 0 || step.ray_count == 0 {
+    if surface.triangle == MISS || step.ray_count == 0 {
         return Contribution::default();
     }
     let seen = seen(inputs, surface);
     let matter = matter_at(inputs, surface);
-    let Some((chosen, factor)) = choose(inputs, step, index, matter, &seen, probe, hits) else {
-        return Contribution::default();
+    let (delta, triangle, factor) = if matter.material.model == MODEL_LAMBERT {
+        let weights = surface.barycentric.as_dvec2();
+        let strength = texture::medium(inputs, matter.material, surface.triangle, weights).strength;
+        (DVec3::ZERO, surface.triangle, strength.as_dvec3())
+    } else {
+        match choose(inputs, step, index, matter, &seen, probe, hits) {
+            Some((chosen, factor)) => (delta(probe, hits, chosen), hits.triangle[chosen], factor),
+            None => return Contribution::default(),
+        }
     };
-    let delta = delta(probe, hits, chosen);
     let point = surface.position.as_dvec3() + delta;
-    let entry = Entry::new(inputs, matter.material, seen.side, point, hits.triangle[chosen]);
+    let entry = Entry::new(inputs, matter.material, seen.side, point, triangle);
     let leaving = entry.tint
         * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
         * crossing(inputs, matter.material, seen.shading_normal.dot(seen.wo))
         * profile::obliqueness(matter, seen.shading_normal.dot(seen.wo), true);
     let given = inputs.features.projection == PROJECTION_CAMERA;
     let exponent = if given { f64::from(matter.material.camera_rate) * f64::from(probe.radius) } else { 0.0 };
-    let local = texture::medium(inputs, matter.material, hits.triangle[chosen], entry.weights);
+    let local = texture::medium(inputs, matter.material, triangle, entry.weights);
     let value = |wi: DVec3| match matter.material.model {
         MODEL_DIRECTIONAL => directed(Matter { material: &local, ..matter }, &seen, delta, entry.shading, wi, exponent),
         _ => profile::obliqueness(matter, entry.shading.dot(wi), false),
@@ -142,6 +152,9 @@ pub fn choose(
     probe: &Probe,
     hits: &Hits,
 ) -> Option<(usize, DVec3)> {
+    if hits.count == 0 {
+        return None;
+    }
     let normal = |j: usize| seen.side * geometric_normal(&inputs.triangles[hits.triangle[j] as usize]);
     // The matter as it is where hit j lets light in.
     let local = |j: usize| {

@@ -36,7 +36,7 @@ pub enum Film {
 /// The buffers with elements for each pixel of a band that a render needs.
 pub fn slots(prepared: &Prepared) -> Vec<Slot> {
     let mut slots = vec![Slot::Surfaces, Slot::RunningSums, Slot::Pixels];
-    if prepared.has_translucent {
+    if prepared.has_probes {
         slots.extend([Slot::Probes, Slot::HitLists]);
     }
     if prepared.features.batches != 0 {

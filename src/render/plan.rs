@@ -108,7 +108,12 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
             false => (false, "nothing is recorded into a caller's command buffer"),
         },
         "resolve" => (true, "makes means and variances of the sums"),
-        "sample" | "reproject" | "accumulate" => match prepared.has_translucent {
+        "sample" | "reproject" => match (prepared.has_probes, prepared.has_translucent) {
+            (true, _) => (true, "a surface is translucent"),
+            (false, true) => (false, "every translucent surface is in the opaque limit: light leaves where it entered"),
+            (false, false) => (false, "no surface is translucent"),
+        },
+        "accumulate" => match prepared.has_translucent {
             true => (true, "a surface is translucent"),
             false => (false, "no surface is translucent"),
         },
@@ -145,7 +150,7 @@ fn absent(slot: Slot) -> String {
         Slot::Texels | Slot::Textures | Slot::Coordinates => "no texture",
         Slot::Profiles => "no material has the table model",
         Slot::Thickness => "no profile depends on the curvature",
-        Slot::Probes | Slot::HitLists => "no surface is translucent",
+        Slot::Probes | Slot::HitLists => "no surface is translucent, or all that are in the opaque limit",
         Slot::BatchSums => "no variance is asked for",
         Slot::Progresses | Slot::Samples | Slot::Colors => "nothing is recorded into a caller's command buffer",
         Slot::Counters => "steps are counted in tests and benchmarks only",

@@ -36,7 +36,8 @@ pub fn table(folder: Option<&Path>, ior: f64, g: f64, walks: u64) -> White {
     if let Some(table) = known.filter(|table| table.ior == ior && table.g == g) {
         return table;
     }
-    log::info!("simulating light in matter of index {ior}, g {g}: once, some seconds");
+    let place = folder.map_or("not kept".into(), |folder| format!("kept in {}", folder.display()));
+    log::info!("simulating light in matter of index {ior}, g {g}: about half a minute of two cores, {place}");
     let bytes = encode(&White::simulate(ior, g, &[f64::INFINITY], |_| walks));
     if let Some(file) = file
         && let Err(error) = write(&file, &bytes)

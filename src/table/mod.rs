@@ -73,15 +73,23 @@ pub fn walks(g: f64) -> u64 {
     (f64::from(1 << 18) * (10.0 * (1.0 - g)).min(1.0)).max(f64::from(1 << 15)) as u64
 }
 
+/// The index of a table that the crate ships.
+fn shipped_index(ior: f64, g: f64) -> Option<usize> {
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
+    SHIPPED_IORS.iter().position(|&shipped| near(shipped, ior)).filter(|_| near(g, 0.0))
+}
+
+/// Whether the crate ships the table of matter; else it is simulated, or comes from the cache.
+pub fn is_shipped(ior: f64, g: f64) -> bool {
+    shipped_index(ior, g).is_some()
+}
+
 /// The table of matter: shipped, from memory, from the cache, or simulated.
 ///
 /// Memory here only saves work: a table depends on nothing but its arguments.
 pub fn table(ior: f64, g: f64) -> Arc<White> {
     static MADE: LazyLock<Mutex<HashMap<(u64, u64), Arc<White>>>> = LazyLock::new(Mutex::default);
-    let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
-    if near(g, 0.0)
-        && let Some(index) = SHIPPED_IORS.iter().position(|&shipped| near(shipped, ior))
-    {
+    if let Some(index) = shipped_index(ior, g) {
         return shipped(index);
     }
     // Digits that no measurement has would only fill the cache.

@@ -2,7 +2,7 @@
 
 use crate::{
     channel, render,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::DVec3;
 use serde_json::Value;
@@ -31,7 +31,7 @@ fn balls(materials: &[Value], columns: usize, mesh: &Mesh) -> (Scene, Settings) 
     let middle = DVec3::new(1.25 * (columns - 1) as f64, -1.25 * (rows - 1) as f64, 0.0);
     let eye = Eye { eye: middle + DVec3::Z * 10.0, at: middle, lens: -1.25 * rows as f64 };
     let resolution = (8 * columns as u32, 8 * rows as u32);
-    let settings = Settings { resolution: Some(resolution), seed: 11, ..Settings::default() };
+    let settings = Settings { resolution: Some(resolution), seed: 11, ..standard() };
     (scene(&gltf(&meshes, materials, &[], &eye)), settings)
 }
 
@@ -131,7 +131,7 @@ fn grazing_light_enters_by_its_cosine() {
         let angle = elevation.to_radians();
         let light = (sun(), DVec3::new(angle.cos(), 0.0, angle.sin()) * 100.0, DVec3::ZERO);
         let scene = scene(&gltf(&[(mesh.clone(), 0)], &[matter([0.95; 3], [0.05; 3], ior)], &[light], &eye));
-        let image = render(&scene, &Settings { resolution: Some((4, 4)), seed: 1, ..Settings::default() }, 128);
+        let image = render(&scene, &Settings { resolution: Some((4, 4)), seed: 1, ..standard() }, 128);
         let values = channel(&image, "subsurface.G");
         let mean = values.iter().map(|x| f64::from(*x)).sum::<f64>() / values.len() as f64;
         let cos = angle.sin();

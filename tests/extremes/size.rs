@@ -2,7 +2,7 @@
 
 use crate::{
     channel, render,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::DVec3;
 use translucent::{Device, DeviceOptions, Renderer, Settings};
@@ -28,7 +28,7 @@ fn slivers_change_nothing() {
     let light = || (sun(), DVec3::new(3.0, 4.0, 2.0), DVec3::ZERO);
     let images = [whole, slivers].map(|mesh| {
         let scene = scene(&gltf(&[(mesh, 0)], &[matter([4.0, 2.0, 1.0], [0.3; 3], 1.4)], &[light()], &eye()));
-        let settings = Settings { resolution: Some((32, 32)), seed: 3, ..Settings::default() };
+        let settings = Settings { resolution: Some((32, 32)), seed: 3, ..standard() };
         let image = render(&scene, &settings, 32);
         channel(&image, "subsurface.G").iter().map(|x| f64::from(*x)).collect::<Vec<_>>()
     });
@@ -45,7 +45,7 @@ fn too_many_triangles_are_refused_by_number() {
     let of = |subdivision: u32| {
         let mesh = Mesh::sphere(1.0, subdivision);
         let scene = scene(&gltf(&[(mesh, 0)], &[matter([1.0; 3], [0.1; 3], 1.3)], &[], &eye()));
-        let settings = Settings { resolution: Some((4, 4)), ..Settings::default() };
+        let settings = Settings { resolution: Some((4, 4)), ..standard() };
         Renderer::new(&device, &scene, &settings).map(|_| ()).map_err(|error| error.to_string())
     };
     of(10).expect("800 triangles of 40 bytes fit");

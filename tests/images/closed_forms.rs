@@ -2,7 +2,7 @@
 
 use crate::{
     channel, mean_and_error, render,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::DVec3;
 use translucent::{
@@ -34,7 +34,7 @@ fn sun_at(angle_degrees: f64) -> DVec3 {
 }
 
 fn settings() -> Settings {
-    Settings { resolution: Some((4, 4)), seed: 1, ..Settings::default() }
+    Settings { resolution: Some((4, 4)), seed: 1, ..standard() }
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn sphere_in_uniform_light_is_flat() {
             let eye = Eye { eye: DVec3::new(0.0, 0.0, distance), at: DVec3::ZERO, lens };
             let mut scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, &[], &eye));
             scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
-            let image = render(&scene, &Settings { resolution: Some((48, 48)), seed: 5, ..Settings::default() }, 64);
+            let image = render(&scene, &Settings { resolution: Some((48, 48)), seed: 5, ..standard() }, 64);
             let expected = dipole.cdf(2.0 * radius);
             // Cosine at which a ray through column x and row y meets the true sphere; not a number where it does not.
             let cosine = |x: f64, y: f64| {
@@ -180,7 +180,7 @@ fn sphere_emits_what_enters_it() {
         for direction in [axis, -axis] {
             let eye = Eye { eye: direction * 10.0, at: DVec3::ZERO, lens: -1.05 };
             let scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, std::slice::from_ref(&light), &eye));
-            let settings = Settings { resolution: Some((resolution, resolution)), seed: 9, ..Settings::default() };
+            let settings = Settings { resolution: Some((resolution, resolution)), seed: 9, ..standard() };
             let image = render(&scene, &settings, 16);
             let pixel_area = (2.1 / f64::from(resolution)).powi(2);
             for i in 0..(resolution * resolution) as usize {
@@ -222,8 +222,7 @@ fn lit_pixels_do_not_depend_on_size_or_place() {
         nodes.push(serde_json::json!({"children": children, "translation": [offset, -offset, offset * 0.5]}));
         let parent = nodes.len() - 1;
         file["scenes"][0]["nodes"] = serde_json::json!([parent]);
-        let settings =
-            Settings { resolution: Some((32, 32)), camera: CameraChoice::Index(0), seed: 2, ..Settings::default() };
+        let settings = Settings { resolution: Some((32, 32)), camera: CameraChoice::Index(0), seed: 2, ..standard() };
         let image = render(&scene(&file), &settings, 16);
         to_f64(channel(&image, "subsurface.G"))
     };

@@ -2,7 +2,7 @@
 
 use crate::{
     channel, device,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
     twins::{assert_agree, layer, opaque, table},
 };
 use glam::{DVec3, Vec3};
@@ -44,7 +44,7 @@ fn uniform(mut scene: Scene, radiance: DVec3) -> Scene {
 }
 
 fn settings(width: u32, height: u32) -> Settings {
-    Settings { resolution: Some((width, height)), seed: 6, show_environment: true, ..Settings::default() }
+    Settings { resolution: Some((width, height)), seed: 6, show_environment: true, ..standard() }
 }
 
 fn lit(image: &Image, name: &str) -> bool {

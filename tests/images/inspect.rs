@@ -2,12 +2,12 @@
 
 use crate::{
     device,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::DVec3;
 use serde_json::json;
 use translucent::{
-    Renderer, Scene, Settings,
+    Model, Renderer, Scene, Settings,
     inspect::Inspection,
     render::Limits,
     scene::{Environment, EnvironmentMap},
@@ -40,7 +40,7 @@ fn inspect_lists_the_buffers_and_kernels_that_a_renderer_makes() {
     let light = (sun(), DVec3::Z, DVec3::ZERO);
     let lit = |material: serde_json::Value| scene(&gltf(&[(cube.clone(), 0)], &[material], &[light.clone()], &eye));
     let smooth = || lit(matter([1.0; 3], [0.1; 3], 1.3));
-    let settings = Settings { resolution: Some((40, 30)), ..Settings::default() };
+    let settings = Settings { resolution: Some((40, 30)), ..standard() };
 
     // A delta light on smooth matter: no highlight, no environment.
     let (kernels, slots) = check(&smooth(), &settings);
@@ -49,6 +49,11 @@ fn inspect_lists_the_buffers_and_kernels_that_a_renderer_makes() {
     for absent in [Slot::Environment, Slot::EnvironmentCdf, Slot::Counters] {
         assert!(!slots.contains(&absent), "{absent:?}");
     }
+
+    // Nothing is sampled where all that is translucent is in the opaque limit.
+    let (kernels, slots) = check(&smooth(), &Settings { model: Model::Lambert, ..settings.clone() });
+    assert_eq!(kernels, ["primary", "accumulate", "resolve"]);
+    assert!(!slots.contains(&Slot::Probes) && !slots.contains(&Slot::HitLists));
 
     // No variance, several bands.
     let (_, slots) = check(&smooth(), &Settings { variance: false, band_pixels: Some(200), ..settings.clone() });

@@ -2,7 +2,7 @@
 
 use crate::{
     channel, mean_and_error, render,
-    scenes::{Eye, Mesh, gltf, matter, scene},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard},
 };
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -39,7 +39,7 @@ fn from_above(distance: f64) -> Eye {
 }
 
 fn settings() -> Settings {
-    Settings { resolution: Some((4, 4)), seed: 3, ..Settings::default() }
+    Settings { resolution: Some((4, 4)), seed: 3, ..standard() }
 }
 
 /// Mean and standard error of a channel over independent pixels.
@@ -348,7 +348,7 @@ fn every_range_of_samples_has_the_same_mean() {
     let mut scene = scene(&gltf(&[(Mesh::sphere(1.0, 8), 0), (table, 1)], &[skin, plaster()], &[lamp], &eye));
     scene.set_environment(image(8, 4, |x, y| if (x + y) % 3 == 0 { 2.0 } else { 0.0 })).expect("valid");
     let device = crate::device();
-    let settings = Settings { resolution: Some((64, 64)), seed: 11, ..Settings::default() };
+    let settings = Settings { resolution: Some((64, 64)), seed: 11, ..standard() };
     let mut renderer = Renderer::new(&device, &scene, &settings).expect("the renderer is made");
     let mut image_of = |range: std::ops::Range<u32>| {
         renderer.reset();

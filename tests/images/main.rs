@@ -8,6 +8,7 @@ mod fireflies;
 mod harness;
 mod inspect;
 mod integrator;
+mod lambert;
 mod lights;
 mod measure;
 mod repeatable;

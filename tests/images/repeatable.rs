@@ -1,7 +1,7 @@
 //! The image is a function of scene, settings and samples alone.
 #![allow(clippy::single_range_in_vec_init)] // lists of ranges, of which some hold one
 
-use crate::{channel, device};
+use crate::{channel, device, scenes::standard};
 use std::ops::ControlFlow;
 use translucent::{Renderer, Scene, Settings, image::Image};
 
@@ -10,7 +10,7 @@ fn demo() -> Scene {
 }
 
 fn settings() -> Settings {
-    Settings { resolution: Some((60, 44)), seed: 7, ..Settings::default() }
+    Settings { resolution: Some((60, 44)), seed: 7, ..standard() }
 }
 
 fn image(settings: &Settings, ranges: &[std::ops::Range<u32>]) -> Image {

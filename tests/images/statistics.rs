@@ -1,6 +1,6 @@
 //! The variance that an image states is the one it has.
 
-use crate::{channel, device};
+use crate::{channel, device, scenes::standard};
 use translucent::{Renderer, Scene, Settings};
 
 const SEEDS: u32 = 64;
@@ -8,7 +8,7 @@ const SEEDS: u32 = 64;
 #[test]
 fn stated_variance_is_the_spread_over_seeds() {
     let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/demo.gltf")).expect("the shipped scene loads");
-    let settings = Settings { resolution: Some((20, 20)), ..Settings::default() };
+    let settings = Settings { resolution: Some((20, 20)), ..standard() };
     let device = device();
     let mut renderer = Renderer::new(&device, &scene, &settings).expect("the renderer is made");
     let mut image = |seed, samples| {

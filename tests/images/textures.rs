@@ -2,7 +2,7 @@
 
 use crate::{
     channel, mean_and_error, render,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
     twins::both,
 };
 use base64::Engine;
@@ -113,7 +113,7 @@ fn noisy() -> Scene {
 #[test]
 fn image_is_the_twins() {
     let scene = noisy();
-    let settings = Settings { resolution: Some((20, 20)), seed: 4, show_environment: true, ..Settings::default() };
+    let settings = Settings { resolution: Some((20, 20)), seed: 4, show_environment: true, ..standard() };
     let (image, twins) = both(&scene, &settings, 8);
     let mut found = vec![];
     for (i, twin) in twins.iter().enumerate() {
@@ -140,7 +140,7 @@ fn white_textures_change_no_bit() {
     let light = (sun(), DVec3::new(3.0, 4.0, 2.0), DVec3::ZERO);
     let mut file = gltf(&[(mesh.clone(), 0)], &[scattering([0.9, 0.8, 0.7], 5.0)], &[light], &eye);
     file["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] = json!(0.4);
-    let settings = Settings { resolution: Some((24, 24)), seed: 4, ..Settings::default() };
+    let settings = Settings { resolution: Some((24, 24)), seed: 4, ..standard() };
     let plain = render(&scene(&file), &settings, 8);
     add_coordinates(&mut file, 0, mesh.positions.iter().map(|p| DVec2::new(p.x, p.y)));
     let white = add_texture(&mut file, &RgbaImage::from_pixel(3, 2, Rgba([255; 4])), json!({}));
@@ -272,7 +272,7 @@ fn a_light_below_either_horizon_lights_nothing() {
             let mut file = gltf(&[(sheet.clone(), 0)], &[material], &[(sun(), light, DVec3::ZERO)], &eye);
             add_coordinates(&mut file, 0, sheet.positions.iter().map(|p| DVec2::new(p.x, -p.y)));
             texture(&mut file, green);
-            let settings = Settings { resolution: Some((4, 4)), ..Settings::default() };
+            let settings = Settings { resolution: Some((4, 4)), ..standard() };
             let image = render(&scene(&file), &settings, 16);
             assert!(channel(&image, "G").iter().all(|x| *x == 0.0), "{light}");
         }
@@ -287,7 +287,7 @@ fn a_mask_is_its_geometry() {
     table.quad(DVec3::new(-3.0, -1.0, 3.0), DVec3::X * 6.0, DVec3::Z * -6.0);
     let paint = json!({"pbrMetallicRoughness": {"metallicFactor": 0.0}});
     let light = (sun(), DVec3::new(1.0, 4.0, 0.5), DVec3::ZERO);
-    let settings = Settings { resolution: Some((40, 40)), seed: 3, ..Settings::default() };
+    let settings = Settings { resolution: Some((40, 40)), seed: 3, ..standard() };
     for glowing in [scattering([0.8; 3], 20.0), paint.clone()] {
         let mut whole = Mesh::default();
         whole.quad(DVec3::new(-1.0, 0.0, 1.0), DVec3::X * 2.0, DVec3::Z * -2.0);

@@ -2,7 +2,7 @@
 
 use crate::{
     channel, device,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -89,7 +89,7 @@ fn image_is_the_twins() {
             projection,
             directions: 2,
             show_environment: true,
-            ..Settings::default()
+            ..standard()
         };
         let (image, twins) = both(&scene, &settings, 8);
         let found = differences(&image, &twins);

@@ -2,7 +2,7 @@
 
 use crate::{
     Case, assert_close, bench,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec3};
 use translucent::{
@@ -23,7 +23,7 @@ fn sheets() -> Case {
     let eye = Eye { eye: DVec3::new(0.0, 0.0, 5.0), at: DVec3::ZERO, lens: 0.1 };
     let light = (sun(), DVec3::new(0.5, 0.3, 4.0), DVec3::ZERO);
     let file = gltf(&[(mesh, 0)], &[matter([2.0, 3.0, 1.0], [0.2; 3], 1.3)], &[light], &eye);
-    Case::new(scene(&file), &Settings { resolution: Some((PIXELS, 1)), seed: 5, ..Settings::default() })
+    Case::new(scene(&file), &Settings { resolution: Some((PIXELS, 1)), seed: 5, ..standard() })
 }
 
 /// The uppermost sheet at a point of each pixel, and a probe that crosses all sheets there.

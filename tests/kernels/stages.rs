@@ -1,6 +1,6 @@
 //! Every stage of the pipeline on real scenes.
 
-use crate::{Case, assert_close};
+use crate::{Case, assert_close, scenes::standard};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -61,7 +61,7 @@ fn cases() -> Vec<(String, Case)> {
             crop: Some(CROP),
             seed: 3,
             single_scattering: SingleScattering::On,
-            ..Settings::default()
+            ..standard()
         };
         cases.push((format!("emitters, {}", scene.lights.len()), Case::new(scene, &settings)));
     }
@@ -80,7 +80,7 @@ fn cases() -> Vec<(String, Case)> {
                 seed: 3,
                 show_environment: true,
                 single_scattering: SingleScattering::On,
-                ..Settings::default()
+                ..standard()
             };
             cases.push((format!("{projection:?}, {name}"), Case::new(scene, &settings)));
         }
@@ -91,6 +91,8 @@ fn cases() -> Vec<(String, Case)> {
         (Model::Burley, Projection::Camera, Some(&constant)),
         (Model::Directional, Projection::Mis, None),
         (Model::Directional, Projection::Camera, Some(&constant)),
+        (Model::Lambert, Projection::Mis, None),
+        (Model::Lambert, Projection::Camera, Some(&constant)),
     ];
     for (model, projection, environment) in others {
         let mut scene = demo.clone();
@@ -310,7 +312,7 @@ fn lit_from_below() -> (String, Case, Stages) {
         crop: Some(CROP),
         seed: 5,
         single_scattering: SingleScattering::On,
-        ..Settings::default()
+        ..standard()
     };
     let case = Case::new(scene, &settings);
     let stages = stages(&case.inputs(), SAMPLES[1]);

@@ -1,6 +1,6 @@
 //! No invocation comes near the 65,535 loop trips after which Mesa 22 silently ends it.
 
-use crate::bench;
+use crate::{bench, scenes::standard};
 use base64::Engine;
 use translucent::{
     LoadOptions, Renderer, Scene, Settings,
@@ -16,7 +16,7 @@ const LANES: u32 = 16;
 
 /// Largest number of steps of one traversal in a render.
 fn largest_step_count(scene: &Scene) -> u32 {
-    let settings = Settings { resolution: Some((96, 96)), ..Settings::default() };
+    let settings = Settings { resolution: Some((96, 96)), ..standard() };
     let bench = bench();
     let mut renderer = Renderer::counting(&bench.device, scene, &settings).expect("the renderer is made");
     renderer.render(8).expect("renders");

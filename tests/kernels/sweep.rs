@@ -3,7 +3,7 @@
 
 use crate::{
     Case, bench,
-    scenes::{Eye, Mesh, gltf, matter, scene, sun},
+    scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -121,10 +121,15 @@ fn world(seed: u32) -> Case {
     let projection = random.pick(&[Projection::Mis, Projection::Mis, Projection::Normal, Projection::Camera]);
     let built = [Model::Standard, Model::Better, Model::Burley, Model::Directional];
     let model = built[seed as usize % built.len()];
-    let settings = Settings { resolution: Some((PIXELS / 8, 8)), projection, seed, ..Settings::default() };
+    let settings = Settings { resolution: Some((PIXELS / 8, 8)), projection, seed, ..standard() };
     let mut case = Case::new(scene, &settings);
-    for material in &mut case.prepared.materials {
-        *material = random_material(&mut random, model, projection);
+    for (index, material) in case.prepared.materials.iter_mut().enumerate() {
+        // An eighth in the opaque limit, as of tables.
+        let lambert = index % 8 == 7;
+        *material = random_material(&mut random, if lambert { Model::Lambert } else { model }, projection);
+        if lambert {
+            (material.slope, material.obliqueness) = (0.5 * random.point().as_vec3(), random.next() as f32);
+        }
     }
     let models = case.prepared.materials.iter().fold(0, |mask, material| mask | 1 << material.model);
     case.prepared.features.models = models;

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, Vec3};
 use image::{ImageFormat, Rgba, RgbaImage};
 use serde_json::json;
 use translucent::{
-    LoadOptions, Scene, Settings,
+    LoadOptions, Model, Scene, Settings,
     prepare::prepare,
     reference::{profile, texture},
     scene::AlbedoMapping,
@@ -110,7 +110,7 @@ fn scene(name: &str, rho: f64, g: f64, textured: bool, albedo_mapping: AlbedoMap
 }
 
 fn materials(scene: &Scene) -> Vec<Material> {
-    let settings = Settings { resolution: Some((1, 1)), ..Settings::default() };
+    let settings = Settings { resolution: Some((1, 1)), model: Model::Standard, ..Settings::default() };
     prepare(scene, &settings).expect("settings that fit").materials
 }
 

@@ -29,7 +29,7 @@ fn inspect_says_what_a_scene_requires() {
     let buffers = json["buffers"].as_array().expect("a list");
     let sum: u64 = buffers.iter().map(|buffer| buffer["bytes"].as_u64().expect("bytes")).sum();
     assert_eq!(json["deviceBytes"].as_u64(), Some(sum));
-    // The standard dipole needs no single scattering.
+    // No model that is recommended for marble needs single scattering.
     let kernels = json["kernels"].as_array().expect("a list");
     let unused = ["begin", "clear", "single"];
     let expected = |stem: &serde_json::Value| !unused.contains(&stem.as_str().expect("a stem"));
@@ -39,4 +39,52 @@ fn inspect_says_what_a_scene_requires() {
     let missing = folder.run("inspect missing.glb");
     assert_eq!(missing.status.code(), Some(2));
     assert!(stderr(&missing).contains("missing.glb"));
+}
+
+#[test]
+fn auto_is_what_inspect_recommends() {
+    let folder = Folder::new("auto");
+    let inspect = |words: &str| -> Value {
+        let words = format!("inspect SPOT --material wax=marble --resolution 64x48 --json {words}");
+        serde_json::from_str(&folder.done(&words)).expect("JSON")
+    };
+    // Animals of 13 cm, 13 m and 130 km; light travels some 3 mm.
+    for (unit, model, limit_of) in
+        [("m", "table", "table"), ("100m", "burley", "burley"), ("1000000m", "lambert", "better")]
+    {
+        let json = inspect(&format!("--unit {unit}"));
+        let matter = &json["materials"][0]["matter"];
+        assert_eq!((&matter["model"], &matter["limitOf"]), (&model.into(), &limit_of.into()), "{unit}: {matter}");
+        assert_eq!(matter["recommended"]["model"], model);
+        let used = |name: &str| {
+            let kernels = json["kernels"].as_array().expect("a list");
+            kernels.iter().find(|kernel| kernel["kernel"] == name).expect("a kernel")["used"] == true
+        };
+        let probes = model != "lambert";
+        assert_eq!(["sample", "reproject", "accumulate"].map(used), [probes, probes, true], "{unit}");
+    }
+    // The settings' model comes first.
+    let matter = &inspect("--unit m --model standard")["materials"][0]["matter"];
+    assert_eq!((&matter["model"], &matter["recommended"]["model"]), (&"standard".into(), &"table".into()));
+}
+
+#[test]
+fn models_beyond_their_validity_bring_a_warning_with_the_expected_error() {
+    let folder = Folder::new("validity");
+    let small = "SPOT --unit cm --material wax=skin1 --resolution 8x8";
+    let expected = "wax: a plane with the directional model sends out +";
+    for words in [format!("render {small} --samples 1"), format!("inspect {small}")] {
+        let said = |model: &str| {
+            let output = folder.run(&format!("{words} --model {model}"));
+            assert_eq!(output.status.code(), Some(0));
+            stderr(&output) + &String::from_utf8_lossy(&output.stdout)
+        };
+        let text = said("directional");
+        assert!(text.contains(expected) && text.contains("; table errs less"), "{words}: {text}");
+        for model in ["auto", "table"] {
+            assert!(!said(model).contains("a plane with the"), "{words}, {model}");
+        }
+    }
+    let quiet = folder.run(&format!("render {small} --samples 1 --model directional --quiet"));
+    assert_eq!(stderr(&quiet), "");
 }

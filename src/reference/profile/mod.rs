@@ -18,6 +18,7 @@
 pub mod better;
 pub mod burley;
 pub mod directional;
+pub mod lambert;
 mod source;
 pub mod standard;
 pub mod table;
@@ -25,6 +26,7 @@ pub mod table;
 pub use better::BetterDipole;
 pub use burley::{Burley, Fit};
 pub use directional::Directional;
+pub use lambert::Lambert;
 pub use source::Source;
 pub use standard::{Dipole, boundary_factor, invert_total};
 pub use table::Tabulated;
@@ -33,7 +35,8 @@ use super::boundary::{Side, diffuse_reflectance};
 use crate::scene::{LengthKind, Medium};
 use crate::settings::{self, Model, Normalisation};
 use crate::shared::{
-    self, MODEL_BETTER, MODEL_BURLEY, MODEL_DIRECTIONAL, MODEL_STANDARD, MODEL_TABLE, Material, RECIPROCAL, TRANSLUCENT,
+    self, MODEL_BETTER, MODEL_BURLEY, MODEL_DIRECTIONAL, MODEL_LAMBERT, MODEL_STANDARD, MODEL_TABLE, Material,
+    RECIPROCAL, TRANSLUCENT,
 };
 use crate::table::block::Block;
 use glam::DVec3;
@@ -225,6 +228,7 @@ models! {
     Directional, MODEL_DIRECTIONAL: Directional;
     Burley, MODEL_BURLEY: Burley;
     Table, MODEL_TABLE: Tabulated;
+    Lambert, MODEL_LAMBERT: Lambert;
 }
 
 /// A material with what else its profile reads.
@@ -265,9 +269,14 @@ pub fn plane_density(matter: Matter, r: f64) -> f64 {
     matter.material.density.as_dvec3().dot(shapes(matter, r))
 }
 
-/// Factor of the profile on light that enters, or leaves, at a cosine outside; 1 but for the table model.
+/// Factor of the profile on light that enters, or leaves, at a cosine outside; 1 but for the table model and its opaque
+/// limit.
 pub fn obliqueness(matter: Matter, cos: f64, leaving: bool) -> DVec3 {
-    if matter.material.model == MODEL_TABLE { table::obliqueness(matter, cos, leaving) } else { DVec3::ONE }
+    match matter.material.model {
+        MODEL_TABLE => table::obliqueness(matter.material, table::slope(matter), cos, leaving),
+        MODEL_LAMBERT => table::obliqueness(matter.material, matter.material.slope.as_dvec3(), cos, leaving),
+        _ => DVec3::ONE,
+    }
 }
 
 /// The radius that two numbers in [0, 1) pick.
@@ -306,6 +315,9 @@ impl Options {
 /// Coefficients in 1/internal unit. Channels that scatter are equally probable; within one, a component is as probable
 /// as its part of the mass.
 pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> shared::Material {
+    if model == MODEL_LAMBERT {
+        return lambert::limit(MODEL_STANDARD, matter, options);
+    }
     let ior = matter[0].ior;
     let channels = matter.each_ref().map(|matter| Profile::new(model, matter));
     let scattering = || channels.iter().filter(|c| c.strength() > 0.0);

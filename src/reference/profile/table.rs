@@ -201,14 +201,18 @@ pub(super) fn radius(matter: Matter, c: usize, share: f64, u: f64) -> f64 {
     part.unbent(Node::of(matter, part.node).column(c).draw(u))
 }
 
+/// k of the three channels.
+pub(super) fn slope(matter: Matter) -> DVec3 {
+    parts(matter).iter().map(|part| part.weight * Node::of(matter, part.node).vector(5)).sum()
+}
+
 /// The factor 1 + k (1 - mu') on light that enters, or 1 over its mean times it on light that leaves, at the cosine
 /// outside.
-pub(super) fn obliqueness(matter: Matter, cos: f64, leaving: bool) -> DVec3 {
-    let slope: DVec3 = parts(matter).iter().map(|part| part.weight * Node::of(matter, part.node).vector(5)).sum();
-    let n = f64::from(matter.material.ior);
+pub(super) fn obliqueness(material: &Material, slope: DVec3, cos: f64, leaving: bool) -> DVec3 {
+    let n = f64::from(material.ior);
     let inside = (1.0 - (1.0 - cos * cos) / (n * n)).max(0.0).sqrt();
     let factor = DVec3::ONE + slope * (1.0 - inside);
-    if leaving { factor / (DVec3::ONE + slope * f64::from(matter.material.obliqueness)) } else { factor }
+    if leaving { factor / (DVec3::ONE + slope * f64::from(material.obliqueness)) } else { factor }
 }
 
 impl Tabulated {
