@@ -43,6 +43,9 @@ pub struct SceneOptions {
     /// Regularisation of the directional dipole near its source; 0 is the published model, with its fireflies.
     #[arg(long, value_name = "K", default_value_t = 1.0, allow_negative_numbers = true, value_parser = arguments::not_negative)]
     kappa: f64,
+    /// Whether the table model follows how thick the body is at each point, or takes every body for a half-space.
+    #[arg(long, value_name = "on|off", default_value = "on", action = clap::ArgAction::Set, value_parser = on_off())]
+    curvature: bool,
     /// Light that was scattered once, added to the standard or the better dipole: on, off, or auto, which is what the
     /// material says, else to a better dipole of matter with an albedo below .95.
     #[arg(long, value_name = "auto|on|off", default_value = "auto", value_parser = single_scattering())]
@@ -93,6 +96,10 @@ fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
 pub fn models() -> impl TypedValueParser<Value = Model> {
     PossibleValuesParser::new(Model::NAMES.map(|(_, name)| name))
         .map(|name| name.parse().expect("the parser passes names alone"))
+}
+
+fn on_off() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|name| name == "on")
 }
 
 fn albedo_mappings() -> impl TypedValueParser<Value = AlbedoMapping> {
@@ -155,6 +162,7 @@ impl SceneOptions {
             normalisation: self.normalisation,
             model: self.model,
             directional: Directional { renormalise: self.renormalise, reciprocal: self.reciprocal, kappa: self.kappa },
+            curvature: self.curvature,
             single_scattering: self.single_scattering,
             show_environment: self.show_environment,
             ..Settings::default()

@@ -3,7 +3,7 @@
 use super::app::App;
 use glam::{DVec3, Vec4};
 use translucent::{
-    Device, Environment, Image, Renderer, Scene, Settings,
+    Device, Environment, Image, Model, Renderer, Scene, Settings,
     ash::vk,
     gpu::{Buffer, Location, RawDevice, Timestamps, download},
     shared::{Pixel, Progress, Slot},
@@ -12,7 +12,13 @@ use translucent::{
 const SIZE: u32 = 8;
 
 fn settings() -> Settings {
-    Settings { seed: 7, resolution: Some((SIZE, SIZE)), recording: true, ..Settings::default() }
+    Settings {
+        seed: 7,
+        resolution: Some((SIZE, SIZE)),
+        model: Model::Standard,
+        recording: true,
+        ..Settings::default()
+    }
 }
 
 fn scene() -> Scene {

@@ -38,13 +38,15 @@ impl Folder {
         names
     }
 
-    /// The program with these words, run in this folder; `SPOT` stands for the shipped scene.
+    /// The program with these words, run in this folder; `SPOT` stands for the shipped scene, rendered with the standard
+    /// dipole unless the words name a model: it needs no preparation.
     pub fn command(&self, words: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_translucent"));
         let spot = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/spot.glb");
-        command
-            .current_dir(&self.0)
-            .args(words.split_whitespace().map(|word| if word == "SPOT" { spot } else { word }));
+        command.current_dir(&self.0).args(words.split_whitespace().map(|word| if word == "SPOT" { spot } else { word }));
+        if words.starts_with("render SPOT") && !words.contains("--model") {
+            command.args(["--model", "standard"]);
+        }
         command
     }
 
