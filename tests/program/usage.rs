@@ -91,6 +91,7 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
             "--aov",
             "--camera",
             "--crop",
+            "--curvature",
             "--device",
             "--directions",
             "--environment",
