@@ -31,7 +31,8 @@ pub struct SceneOptions {
     /// Whether all light that enters and is not absorbed leaves again, or the darker constant of Jensen et al. 2001.
     #[arg(long, default_value = "energy", value_parser = normalisations())]
     normalisation: Normalisation,
-    /// How light spreads in every translucent material; auto is what the material says, else the standard dipole.
+    /// How light spreads in every translucent material; auto is what the material says, else what `inspect`
+    /// recommends; lambert is the opaque limit, where light leaves where it entered.
     #[arg(long, default_value = "auto", value_parser = models())]
     model: Model,
     /// Scale the directional dipole so that it gives back no more light than the standard one.

@@ -37,7 +37,7 @@ const ROWS: &[(&str, &str, &str, &str)] = &[
     (
         "mean free path -> 0",
         "probes below the resolution of positions",
-        "the image tends to Lambert's law, its error in proportion to the mean free path",
+        "dipole and table tend to the opaque limit, and it is Lambert's law; their difference in proportion to the path",
         "extremes/opaque_limit.rs::short_paths_tend_to_lambert",
     ),
     (
