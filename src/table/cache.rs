@@ -37,7 +37,7 @@ pub fn table(folder: Option<&Path>, ior: f64, g: f64, walks: u64) -> White {
         return table;
     }
     let place = folder.map_or("not kept".into(), |folder| format!("kept in {}", folder.display()));
-    log::info!("simulating light in matter of index {ior}, g {g}: about half a minute of two cores, {place}");
+    log::info!("simulating light in matter of index {ior}, g {g}: a minute or less on two cores, {place}");
     let bytes = encode(&White::simulate(ior, g, &[f64::INFINITY], |_| walks));
     if let Some(file) = file
         && let Err(error) = write(&file, &bytes)

@@ -12,13 +12,7 @@ use translucent::{
 const SIZE: u32 = 8;
 
 fn settings() -> Settings {
-    Settings {
-        seed: 7,
-        resolution: Some((SIZE, SIZE)),
-        model: Model::Standard,
-        recording: true,
-        ..Settings::default()
-    }
+    Settings { seed: 7, resolution: Some((SIZE, SIZE)), model: Model::Standard, recording: true, ..Settings::default() }
 }
 
 fn scene() -> Scene {

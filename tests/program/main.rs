@@ -43,7 +43,9 @@ impl Folder {
     pub fn command(&self, words: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_translucent"));
         let spot = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/spot.glb");
-        command.current_dir(&self.0).args(words.split_whitespace().map(|word| if word == "SPOT" { spot } else { word }));
+        command
+            .current_dir(&self.0)
+            .args(words.split_whitespace().map(|word| if word == "SPOT" { spot } else { word }));
         if words.starts_with("render SPOT") && !words.contains("--model") {
             command.args(["--model", "standard"]);
         }
