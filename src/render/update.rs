@@ -43,6 +43,11 @@ impl Renderer {
         if bytes.is_empty() { Ok(()) } else { self.write(Slot::Lights, &bytes) }
     }
 
+    /// The material number `index` of the scene, as it is now.
+    pub fn material(&self, index: usize) -> Option<&scene::Material> {
+        self.authored.get(index)
+    }
+
     /// Gives the material number `index` of the scene other parameters: coefficients, index of refraction, colours. The
     /// model stays as it was chosen.
     ///

@@ -30,20 +30,20 @@ pub type Wrap = fn(&CStr, vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction;
 
 impl App {
     pub fn new() -> App {
-        App::wrapped(|_, function| function)
+        App::of_version(vk::API_VERSION_1_3)
     }
 
-    /// With functions of the test's own in place of the device's.
+    /// With functions of the test's own in place of the device's, and without validation, which has handles of its own.
     pub fn wrapped(wrap: Wrap) -> App {
-        App::with(vk::API_VERSION_1_3, wrap)
+        App::with(vk::API_VERSION_1_3, wrap, false)
     }
 
     /// With an instance made for that version of Vulkan.
     pub fn of_version(version: u32) -> App {
-        App::with(version, |_, function| function)
+        App::with(version, |_, function| function, true)
     }
 
-    fn with(version: u32, wrap: Wrap) -> App {
+    fn with(version: u32, wrap: Wrap, validated: bool) -> App {
         let messages = Arc::new(Mutex::new(vec![]));
         let entry = unsafe { ash::Entry::load() }.expect("a loader");
         let application = vk::ApplicationInfo::default().api_version(version);
@@ -53,9 +53,9 @@ impl App {
         let mut validation = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enables);
         let create = vk::InstanceCreateInfo::default()
             .application_info(&application)
-            .enabled_layer_names(&layers)
-            .enabled_extension_names(&extensions)
-            .push_next(&mut validation);
+            .enabled_layer_names(&layers[..usize::from(validated)])
+            .enabled_extension_names(&extensions[..1 + usize::from(validated)]);
+        let create = if validated { create.push_next(&mut validation) } else { create };
         let instance = unsafe { entry.create_instance(&create, None) }.expect("an instance with the validation layer");
         let listen = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(

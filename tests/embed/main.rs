@@ -2,5 +2,7 @@
 //! is gone.
 
 mod app;
+mod c;
 mod device;
+mod leaks;
 mod record;

@@ -11,11 +11,11 @@ use translucent::{
 
 const SIZE: u32 = 8;
 
-fn settings() -> Settings {
+pub fn settings() -> Settings {
     Settings { seed: 7, resolution: Some((SIZE, SIZE)), model: Model::Standard, recording: true, ..Settings::default() }
 }
 
-fn scene() -> Scene {
+pub fn scene() -> Scene {
     let mut scene = Scene::load("assets/spot.glb").expect("the asset");
     scene.set_environment(Environment::constant(DVec3::ONE).expect("a radiance")).expect("an environment");
     scene

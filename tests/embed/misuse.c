@@ -1,0 +1,78 @@
+// Calls that break the header's rules, and what comes back. Prints the version.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <translucent.h>
+
+static void expect(TranslucentResult found, TranslucentResult wanted, const char *reason) {
+    const char *text = translucent_last_error();
+    if (found != wanted || !strstr(text, reason)) {
+        fprintf(stderr, "misuse: %d for %d: \"%s\" for \"%s\"\n", found, wanted, text, reason);
+        exit(1);
+    }
+}
+
+int main(void) {
+    const TranslucentResult ARGUMENT = TRANSLUCENT_RESULT_ARGUMENT;
+    if (strcmp(translucent_last_error(), "") != 0) return 1;
+    expect(translucent_requirements(NULL), ARGUMENT, "requirements is null");
+    TranslucentRequirements requirements = {.struct_size = 4};
+    expect(translucent_requirements(&requirements), ARGUMENT, "requirements.struct_size is 4");
+    requirements.struct_size = sizeof requirements;
+    if (translucent_requirements(&requirements) != TRANSLUCENT_RESULT_OK) return 1;
+    if (requirements.feature_count != 3 || strcmp(requirements.features[1], "synchronization2") != 0) return 1;
+    if (strcmp(requirements.optional_extensions[0], "VK_EXT_external_memory_host") != 0) return 1;
+
+    TranslucentDevice *device = (TranslucentDevice *)&requirements;
+    expect(translucent_device_create(NULL, &device), ARGUMENT, "info is null");
+    if (device) return 1;
+    TranslucentDeviceInfo info = {.struct_size = sizeof info};
+    expect(translucent_device_create(&info, &device), ARGUMENT, "get_instance_proc_addr is null");
+    expect(translucent_device_create(&info, NULL), ARGUMENT, "out is null");
+
+    TranslucentScene *scene;
+    TranslucentSceneInfo file = {.struct_size = sizeof file};
+    expect(translucent_scene_create(&file, &scene), ARGUMENT, "info.file is null");
+    file.file = "\xff";
+    expect(translucent_scene_create(&file, &scene), ARGUMENT, "info.file is not UTF-8");
+    file.file = "nowhere.glb";
+    expect(translucent_scene_create(&file, &scene), TRANSLUCENT_RESULT_FILE, "nowhere.glb");
+    file.data = "{}";
+    file.size = 2;
+    expect(translucent_scene_create(&file, &scene), TRANSLUCENT_RESULT_INPUT, "nowhere.glb");
+    file.data = NULL;
+    file.file = "assets/spot.glb";
+    if (translucent_scene_create(&file, &scene) != TRANSLUCENT_RESULT_OK) return 1;
+    double dark[3] = {-1, 0, 0};
+    expect(translucent_scene_set_constant_environment(scene, dark), TRANSLUCENT_RESULT_INPUT, "environment");
+    uint32_t count;
+    const char *name;
+    if (translucent_scene_material_count(scene, &count) != TRANSLUCENT_RESULT_OK || count == 0) return 1;
+    if (translucent_scene_material_name(scene, 0, &name) != TRANSLUCENT_RESULT_OK || !*name) return 1;
+    expect(translucent_scene_material_name(scene, count, &name), ARGUMENT, "no material");
+
+    TranslucentSettings settings = {.struct_size = sizeof settings};
+    if (translucent_settings_default(&settings) != TRANSLUCENT_RESULT_OK || settings.width != 512) return 1;
+    VkDeviceSize size;
+    expect(translucent_buffer_size(scene, &settings, 99, &size), ARGUMENT, "no TranslucentSlot");
+    if (translucent_buffer_size(scene, &settings, TRANSLUCENT_SLOT_COLORS, &size) != TRANSLUCENT_RESULT_OK) return 1;
+    if (size != 16 * 512 * 512) return 1;
+    settings.model = "clay";
+    expect(translucent_buffer_size(scene, &settings, TRANSLUCENT_SLOT_COLORS, &size), ARGUMENT, "unknown model");
+    settings.model = NULL;
+    settings.width = 0;
+    expect(translucent_buffer_size(scene, &settings, TRANSLUCENT_SLOT_COLORS, &size), TRANSLUCENT_RESULT_INPUT,
+        "resolution");
+    TranslucentRenderer *renderer;
+    expect(translucent_renderer_create(NULL, scene, &settings, NULL, 0, &renderer), ARGUMENT, "device is null");
+    expect(translucent_renderer_render(NULL, 1), ARGUMENT, "renderer is null");
+
+    translucent_scene_destroy(scene);
+    translucent_scene_destroy(NULL);
+    translucent_device_destroy(NULL);
+    translucent_renderer_destroy(NULL);
+    uint32_t version = translucent_version();
+    if (version != TRANSLUCENT_VERSION) return 1;
+    printf("%u.%u.%u\n", version >> 22, version >> 12 & 0x3ff, version & 0xfff);
+    return 0;
+}
