@@ -8,7 +8,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 use translucent::{
-    Device, Environment, Renderer, Scene, Settings,
+    Device, Environment, Model, Renderer, Scene, Settings,
     ash::{self, vk},
     gpu::{Allocation, Allocator, Location, MemoryRequest, RawDevice, Requirements},
 };
@@ -106,7 +106,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         })?;
         let mut scene = Scene::load(input)?;
         scene.set_environment(Environment::constant(glam::DVec3::ONE)?)?;
-        let settings = Settings { resolution: Some((size, size)), recording: true, ..Settings::default() };
+        let resolution = Some((size, size));
+        let settings = Settings { resolution, model: Model::Standard, recording: true, ..Settings::default() };
         let renderer = Renderer::new(&translucent, &scene, &settings)?;
 
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(family);

@@ -286,6 +286,11 @@ enum TranslucentResult translucent_requirements(struct TranslucentRequirements *
 enum TranslucentResult translucent_enable_features(VkPhysicalDeviceVulkan12Features *features12,
                                                    VkPhysicalDeviceVulkan13Features *features13);
 
+// OK for a physical device that can be used; DEVICE for one that lacks something, which translucent_last_error lists.
+enum TranslucentResult translucent_check_physical_device(PFN_vkGetInstanceProcAddr get_instance_proc_addr,
+                                                         VkInstance instance,
+                                                         VkPhysicalDevice physical_device);
+
 // Makes a TranslucentDevice of the caller's handles.
 enum TranslucentResult translucent_device_create(const struct TranslucentDeviceInfo *info,
                                                  struct TranslucentDevice **out);

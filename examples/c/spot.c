@@ -40,6 +40,7 @@ int main(int count, char **arguments) {
     VkPhysicalDevice physical;
     VkResult found = vkEnumeratePhysicalDevices(instance, &one, &physical);
     vk(found == VK_INCOMPLETE ? VK_SUCCESS : found, "vkEnumeratePhysicalDevices");
+    tl(translucent_check_physical_device(vkGetInstanceProcAddr, instance, physical), "the first device");
     VkQueueFamilyProperties families[16];
     uint32_t family_count = 16, family = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(physical, &family_count, families);
@@ -73,6 +74,7 @@ int main(int count, char **arguments) {
     TranslucentSettings settings = {.struct_size = sizeof settings};
     tl(translucent_settings_default(&settings), "settings");
     settings.width = settings.height = size;
+    settings.model = "standard";  // of all models the one that is ready soonest; null leaves the choice to the library
     TranslucentBuffer colors = {.slot = TRANSLUCENT_SLOT_COLORS};
     tl(translucent_buffer_size(scene, &settings, colors.slot, &colors.size), "size of the result");
     VkBufferCreateInfo buffer_info = {.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = colors.size,

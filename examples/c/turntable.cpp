@@ -130,6 +130,7 @@ void run(const std::vector<std::string> &arguments) {
     settings.struct_size = sizeof settings;
     tl(translucent_settings_default(&settings), "settings");
     settings.width = settings.height = size;
+    settings.model = "burley";
     TranslucentRenderer *renderer = nullptr;
     tl(translucent_renderer_create(translucent, scene, &settings, nullptr, 0, &renderer), "renderer");
 

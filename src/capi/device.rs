@@ -7,8 +7,11 @@ use crate::{
     create, destroy, exclusive, guard, read,
 };
 use engine::{
-    Device,
-    ash::vk::{self, Handle},
+    Device, Error,
+    ash::{
+        self,
+        vk::{self, Handle},
+    },
     gpu::{Allocation, Allocator, Location, MemoryRequest, RawDevice, Requirements},
 };
 use std::{
@@ -88,6 +91,28 @@ pub unsafe extern "C" fn translucent_enable_features(
             unsafe { (exclusive(features12, "features12")?, exclusive(features13, "features13")?) };
         Requirements::new().enable(features12, features13);
         Ok(())
+    })
+}
+
+/// OK for a physical device that can be used; DEVICE for one that lacks something, which translucent_last_error lists.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn translucent_check_physical_device(
+    get_instance_proc_addr: PFN_vkGetInstanceProcAddr,
+    instance: VkInstance,
+    physical_device: VkPhysicalDevice,
+) -> TranslucentResult {
+    guard(|| {
+        let get_instance_proc_addr =
+            get_instance_proc_addr.ok_or_else(|| argument("get_instance_proc_addr is null"))?;
+        if instance.is_null() || physical_device.is_null() {
+            return Err(argument("a handle is null"));
+        }
+        // SAFETY: the caller's handles, as the header says.
+        let missing = unsafe {
+            let instance = ash::Instance::load(&ash::StaticFn { get_instance_proc_addr }, instance);
+            Requirements::new().missing(&instance, physical_device)
+        };
+        if missing.is_empty() { Ok(()) } else { Err(Error::Device(format!("it lacks {}", missing.join(", "))).into()) }
     })
 }
 

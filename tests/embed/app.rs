@@ -12,7 +12,7 @@ use translucent::{
 };
 
 pub struct App {
-    _entry: ash::Entry,
+    entry: ash::Entry,
     pub instance: ash::Instance,
     pub physical: vk::PhysicalDevice,
     pub device: ash::Device,
@@ -85,7 +85,7 @@ impl App {
         let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         let timeline = unsafe { device.create_semaphore(&create, None) }.unwrap_or_default();
         App {
-            _entry: entry,
+            entry: entry,
             instance,
             physical,
             device,
@@ -236,6 +236,32 @@ impl App {
         unsafe { self.device.cmd_pipeline_barrier2(commands, &dependency) };
     }
 
+    /// A function of the instance.
+    pub fn instance_function(&self, name: &CStr) -> vk::PFN_vkVoidFunction {
+        unsafe { self.entry.get_instance_proc_addr(self.instance.handle(), name.as_ptr()) }
+    }
+
+    /// gpu-allocator, as an application has it.
+    pub fn allocator(&self) -> Arc<Mutex<gpu_allocator::vulkan::Allocator>> {
+        let description = gpu_allocator::vulkan::AllocatorCreateDesc {
+            instance: self.instance.clone(),
+            device: self.device.clone(),
+            physical_device: self.physical,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        };
+        Arc::new(Mutex::new(gpu_allocator::vulkan::Allocator::new(&description).expect("an allocator")))
+    }
+
+    pub fn pipeline_cache(&self) -> vk::PipelineCache {
+        unsafe { self.device.create_pipeline_cache(&Default::default(), None) }.expect("a cache")
+    }
+
+    pub fn destroy_pipeline_cache(&self, cache: vk::PipelineCache) {
+        unsafe { self.device.destroy_pipeline_cache(cache, None) };
+    }
+
     pub fn timestamps(&self, count: u32) -> vk::QueryPool {
         let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count);
         unsafe { self.device.create_query_pool(&create, None) }.expect("timestamps")
@@ -259,7 +285,7 @@ impl Drop for App {
             self.device.destroy_semaphore(self.timeline, None);
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_device(None);
-            let debug = ext::debug_utils::Instance::new(&self._entry, &self.instance);
+            let debug = ext::debug_utils::Instance::new(&self.entry, &self.instance);
             debug.destroy_debug_utils_messenger(self.messenger, None);
             self.instance.destroy_instance(None);
         }

@@ -6,7 +6,7 @@ use std::{
     process::Command,
     sync::Once,
 };
-use translucent::{Environment, Image, Renderer, Scene, Settings};
+use translucent::{Environment, Image, Model, Renderer, Scene, Settings};
 
 const HEADER: &str = "include/translucent.h";
 
@@ -100,7 +100,7 @@ fn expected(samples: u32) -> Image {
     let device = translucent::Device::open(&Default::default()).expect("a device");
     let mut scene = Scene::load("assets/spot.glb").expect("the asset");
     scene.set_environment(Environment::constant(glam::DVec3::ONE).expect("a radiance")).expect("an environment");
-    let settings = Settings { resolution: Some((SIZE, SIZE)), ..Settings::default() };
+    let settings = Settings { resolution: Some((SIZE, SIZE)), model: Model::Standard, ..Settings::default() };
     let mut renderer = Renderer::new(&device, &scene, &settings).expect("a renderer");
     renderer.render(samples).expect("a render");
     renderer.image().expect("an image")

@@ -2,7 +2,7 @@
 
 use super::app::App;
 use std::sync::{
-    Arc,
+    Arc, Mutex,
     atomic::{AtomicUsize, Ordering},
 };
 use translucent::{
@@ -122,7 +122,7 @@ fn without_a_queue_the_host_fills_buffers_and_staging_is_an_error() {
 
 /// gpu-allocator behind a count.
 struct Counting {
-    inner: std::sync::Mutex<gpu_allocator::vulkan::Allocator>,
+    inner: Arc<Mutex<gpu_allocator::vulkan::Allocator>>,
     given: AtomicUsize,
     held: AtomicUsize,
 }
@@ -143,16 +143,7 @@ unsafe impl Allocator for Counting {
 #[test]
 fn memory_comes_from_the_callers_allocator_and_goes_back() {
     let app = App::new();
-    let inner = gpu_allocator::vulkan::Allocator::new(&gpu_allocator::vulkan::AllocatorCreateDesc {
-        instance: app.instance.clone(),
-        device: app.device.clone(),
-        physical_device: app.physical,
-        debug_settings: Default::default(),
-        buffer_device_address: false,
-        allocation_sizes: Default::default(),
-    });
-    let inner = std::sync::Mutex::new(inner.expect("an allocator"));
-    let counting = Arc::new(Counting { inner, given: AtomicUsize::new(0), held: AtomicUsize::new(0) });
+    let counting = Arc::new(Counting { inner: app.allocator(), given: AtomicUsize::new(0), held: AtomicUsize::new(0) });
     let raw = RawDevice { allocator: Some(counting.clone()), ..app.raw() };
     let device = unsafe { Device::from_raw(raw) }.expect("the device is fit");
     let buffers = [Location::Device, Location::Scratch, Location::Upload, Location::Readback]

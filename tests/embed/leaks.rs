@@ -1,9 +1,7 @@
 //! Everything that is made is destroyed: Vulkan's objects, device memory and the host's, over a thousand cycles.
 
-use super::{
-    app::App,
-    record::{scene, settings},
-};
+use super::{app::App, record::settings};
+use glam::DVec3;
 use std::{
     alloc::{GlobalAlloc, Layout as Bytes, System},
     ffi::{CStr, c_void},
@@ -11,9 +9,10 @@ use std::{
     sync::atomic::{AtomicIsize, AtomicUsize, Ordering::Relaxed},
 };
 use translucent::{
-    Renderer,
+    LoadOptions, Renderer, Scene,
     ash::vk,
     gpu::{Buffer, Layout, Location, Recorder, download, upload},
+    measure::scenes::{Eye, Mesh, gltf, matter},
 };
 
 /// Counts the bytes that Rust holds.
@@ -138,7 +137,11 @@ fn resident() -> isize {
 #[ignore = "run by a_thousand_cycles_leave_nothing"]
 fn cycles() {
     let app = App::wrapped(wrap);
-    let scene = scene();
+    let materials = [matter([50.0; 3], [1.0; 3], 1.3)];
+    let eye = Eye { eye: DVec3::Z * 3.0, at: DVec3::ZERO, lens: 0.7 };
+    let sun = serde_json::json!({"type": "directional"});
+    let file = gltf(&[(Mesh::sphere(1.0, 2), 0)], &materials, &[(sun, DVec3::Z, DVec3::NEG_Z)], &eye);
+    let scene = Scene::from_bytes("ball.gltf", file.to_string().as_bytes(), &LoadOptions::default()).expect("a scene");
     // Of the application: a command pool and a semaphore.
     let before = live();
     let flat = |what: &str, cycle: &mut dyn FnMut()| {

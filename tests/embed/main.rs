@@ -5,4 +5,5 @@ mod app;
 mod c;
 mod device;
 mod leaks;
+mod names;
 mod record;

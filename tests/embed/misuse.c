@@ -30,6 +30,8 @@ int main(void) {
     expect(translucent_device_create(&info, &device), ARGUMENT, "get_instance_proc_addr is null");
     expect(translucent_device_create(&info, NULL), ARGUMENT, "out is null");
 
+    expect(translucent_check_physical_device(NULL, NULL, NULL), ARGUMENT, "get_instance_proc_addr is null");
+
     TranslucentScene *scene;
     TranslucentSceneInfo file = {.struct_size = sizeof file};
     expect(translucent_scene_create(&file, &scene), ARGUMENT, "info.file is null");
@@ -53,13 +55,14 @@ int main(void) {
 
     TranslucentSettings settings = {.struct_size = sizeof settings};
     if (translucent_settings_default(&settings) != TRANSLUCENT_RESULT_OK || settings.width != 512) return 1;
+    settings.model = "standard";
     VkDeviceSize size;
     expect(translucent_buffer_size(scene, &settings, 99, &size), ARGUMENT, "no TranslucentSlot");
     if (translucent_buffer_size(scene, &settings, TRANSLUCENT_SLOT_COLORS, &size) != TRANSLUCENT_RESULT_OK) return 1;
     if (size != 16 * 512 * 512) return 1;
     settings.model = "clay";
     expect(translucent_buffer_size(scene, &settings, TRANSLUCENT_SLOT_COLORS, &size), ARGUMENT, "unknown model");
-    settings.model = NULL;
+    settings.model = "standard";
     settings.width = 0;
     expect(translucent_buffer_size(scene, &settings, TRANSLUCENT_SLOT_COLORS, &size), TRANSLUCENT_RESULT_INPUT,
         "resolution");

@@ -218,6 +218,32 @@ fn times_of_every_dispatch_are_at_their_slots() {
 }
 
 #[test]
+fn renderers_stand_side_by_side_in_one_recording_and_on_threads() {
+    let app = App::new();
+    let device = app.open();
+    let scene = scene();
+    let seeds = [7, 8];
+    let mut renderers = std::thread::scope(|scope| {
+        let make = |seed| {
+            let settings = Settings { seed, ..settings() };
+            let (device, scene) = (&device, &scene);
+            scope.spawn(move || Renderer::new(device, scene, &settings).expect("a renderer"))
+        };
+        seeds.map(make).map(|thread| thread.join().expect("no panic"))
+    });
+    app.run(|commands| unsafe {
+        renderers[0].record(commands, 0..4).expect("it can be recorded");
+        renderers[1].record(commands, 0..8).expect("it can be recorded");
+        renderers[0].record(commands, 4..8).expect("it can be recorded");
+    });
+    let images = renderers.each_mut().map(|renderer| renderer.image().expect("an image"));
+    same(&images[0], &rendered(&scene, 0..8));
+    assert!(images[0].channel("R") != images[1].channel("R"));
+    drop((renderers, device));
+    app.close();
+}
+
+#[test]
 fn what_cannot_be_recorded_is_an_error() {
     let app = App::new();
     let device = app.open();
