@@ -74,6 +74,9 @@
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
+//! The C interface is a package of its own, `src/capi`, which sees this public interface alone; `include/translucent.h` is
+//! made of it.
+//!
 //! The extremes that renders survive, each with its test, are in [`extremes`].
 //!
 //! The program uses this public interface alone. There is no global state: devices and renderers stand side by side.

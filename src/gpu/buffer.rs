@@ -142,7 +142,7 @@ impl Buffer {
         };
         let memory = |problem: String| Error::Memory { step: step.clone(), problem };
         let address = start.as_ptr() as u64;
-        if bytes == 0 || bytes % host.alignment != 0 || address % host.alignment != 0 {
+        if bytes == 0 || !bytes.is_multiple_of(host.alignment) || !address.is_multiple_of(host.alignment) {
             let problem = format!("{bytes} bytes at {address:#x} are not a multiple of {}", host.alignment);
             return Err(memory(problem));
         }

@@ -226,6 +226,7 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
     }
     // SAFETY: the device belongs to this instance; so for the next call.
     let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+    // SAFETY: as above.
     let extensions = unsafe { instance.enumerate_device_extension_properties(physical) }.unwrap_or_default();
     let named = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
     let family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));

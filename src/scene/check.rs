@@ -40,11 +40,11 @@ pub(crate) fn check_light(light: &Light, frame: &Frame) -> Result<()> {
         Some("its position is not finite".to_string())
     } else if !(light.intensity.is_finite() && light.intensity.min_element() >= 0.0) {
         Some(format!("its intensity is {}", light.intensity))
-    } else if !((light.direction.length_squared() - 1.0).abs() <= UNIT) {
+    } else if !light.direction.is_finite() || (light.direction.length_squared() - 1.0).abs() > UNIT {
         Some("its direction is no unit vector".into())
     } else if !cone {
         Some("its angles are not 0 <= inner < outer <= pi/2".into())
-    } else if light.range.is_some_and(|range| !(range > 0.0)) {
+    } else if light.range.is_some_and(|range| range.is_nan() || range <= 0.0) {
         Some("its range is not positive".into())
     } else {
         frame::light_beyond(frame, light)

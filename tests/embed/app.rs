@@ -85,7 +85,7 @@ impl App {
         let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         let timeline = unsafe { device.create_semaphore(&create, None) }.unwrap_or_default();
         App {
-            entry: entry,
+            entry,
             instance,
             physical,
             device,

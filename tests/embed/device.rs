@@ -16,11 +16,16 @@ fn what_crosses_threads() {
     fn send<T: Send>() {}
     fn sync<T: Sync>() {}
     send::<Renderer>();
-    (send::<Device>(), sync::<Device>());
-    (send::<Scene>(), sync::<Scene>());
-    (send::<Settings>(), sync::<Settings>());
-    (send::<Requirements>(), sync::<Requirements>());
-    (send::<Buffer>(), send::<RawDevice>());
+    send::<Device>();
+    sync::<Device>();
+    send::<Scene>();
+    sync::<Scene>();
+    send::<Settings>();
+    sync::<Settings>();
+    send::<Requirements>();
+    sync::<Requirements>();
+    send::<Buffer>();
+    send::<RawDevice>();
 }
 
 #[test]
@@ -102,7 +107,8 @@ fn a_caller_keeps_his_device_and_several_stand_side_by_side() {
     drop(buffers);
     // Still usable.
     one.run(|_| ());
-    (one.close(), two.close());
+    one.close();
+    two.close();
 }
 
 #[test]
