@@ -1,5 +1,5 @@
-//! An application of its own, built on ash, that renders a scene with translucent on its device: its own allocator, its own
-//! command buffers, a timeline semaphore, four samples for each submission. The host waits for nothing but the end.
+//! An application of its own, built on ash, that renders a scene with translucent on its device: its own allocator, its
+//! own command buffers, a timeline semaphore, four samples for each submission. The host waits for nothing but the end.
 //!
 //!     cargo run --example embed -- assets/spot.glb spot.exr [SIZE [SAMPLES]]
 

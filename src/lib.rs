@@ -50,9 +50,9 @@
 //! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
 //! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups.
 //!
-//! *Recordings.* [`Renderer::record`] puts the same dispatches into a command buffer of the caller's, on a device of the
-//! caller's ([`Device::from_raw`]). There `begin` numbers the samples and `clear` forgets the sums if they do not go on, so
-//! what the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
+//! *Recordings.* [`Renderer::record`] puts the same dispatches into a command buffer of the caller's, on a device of his
+//! ([`Device::from_raw`]). There `begin` numbers the samples and `clear` forgets the sums if they do not go on, so what
+//! the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
 //!
 //! # What may use what
 //!
@@ -63,7 +63,7 @@
 //! | [`settings`] | `shared` | [`Settings`]: what a caller may choose |
 //! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
-//! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; no scenes; unsafe code is denied elsewhere, but for `record`'s own signature |
+//! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
 //! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like |
@@ -74,8 +74,9 @@
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
-//! The C interface is a package of its own, `src/capi`, which sees this public interface alone; `include/translucent.h` is
-//! made of it.
+//! Unsafe code is denied outside of `gpu`, but for [`Renderer::record`], whose command buffer is the caller's. The C
+//! interface is a package of its own, `src/capi`, which sees this public interface alone; `include/translucent.h` is made
+//! of it.
 //!
 //! The extremes that renders survive, each with its test, are in [`extremes`].
 //!

@@ -44,8 +44,8 @@ pub enum Model {
     Burley,
     /// Profiles tabulated by simulation.
     Table,
-    /// The opaque limit: light leaves where it entered. Its total is that of the standard dipole, or of the profile that
-    /// would else be recommended where `Auto` finds it enough.
+    /// The opaque limit: light leaves where it entered. Its total is that of the standard dipole, or of the profile
+    /// that would else be recommended where `Auto` finds it enough.
     Lambert,
 }
 
@@ -176,8 +176,8 @@ pub struct Settings {
     /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows. Without it 2^18, or
     /// what the device's bindings and memory allow. The image does not depend on it.
     pub band_pixels: Option<u32>,
-    /// Makes what [`Renderer::record`](crate::Renderer::record) needs: one band, whatever `band_pixels` says, colours in a
-    /// buffer of their own, and the count of samples on the device. The image does not depend on it.
+    /// Makes what [`Renderer::record`](crate::Renderer::record) needs: one band, whatever `band_pixels` says, colours
+    /// in a buffer of their own, and the count of samples on the device. The image does not depend on it.
     pub recording: bool,
     /// Invocations of a workgroup, 1 to 128; the image does not depend on it.
     pub workgroup: u32,

@@ -31,7 +31,8 @@ int main(int count, char **arguments) {
     // Instance and device are the application's; the library says what they need.
     TranslucentRequirements requirements = {.struct_size = sizeof requirements};
     tl(translucent_requirements(&requirements), "requirements");
-    VkApplicationInfo application = {.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO, .apiVersion = requirements.api_version};
+    VkApplicationInfo application = {
+        .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO, .apiVersion = requirements.api_version};
     VkInstanceCreateInfo instance_info = {
         .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO, .pApplicationInfo = &application};
     VkInstance instance;
@@ -46,8 +47,8 @@ int main(int count, char **arguments) {
     vkGetPhysicalDeviceQueueFamilyProperties(physical, &family_count, families);
     while (family < family_count && !(families[family].queueFlags & VK_QUEUE_COMPUTE_BIT)) family++;
     float priority = 1;
-    VkDeviceQueueCreateInfo queue_info = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, .queueFamilyIndex = family,
-        .queueCount = 1, .pQueuePriorities = &priority};
+    VkDeviceQueueCreateInfo queue_info = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+        .queueFamilyIndex = family, .queueCount = 1, .pQueuePriorities = &priority};
     VkPhysicalDeviceVulkan13Features features13 = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
     VkPhysicalDeviceVulkan12Features features12 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES, .pNext = &features13};
@@ -78,7 +79,8 @@ int main(int count, char **arguments) {
     TranslucentBuffer colors = {.slot = TRANSLUCENT_SLOT_COLORS};
     tl(translucent_buffer_size(scene, &settings, colors.slot, &colors.size), "size of the result");
     VkBufferCreateInfo buffer_info = {.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = colors.size,
-        .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT};
+        .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+            VK_BUFFER_USAGE_TRANSFER_DST_BIT};
     vk(vkCreateBuffer(device, &buffer_info, NULL, &colors.buffer), "vkCreateBuffer");
     VkMemoryRequirements needs;
     vkGetBufferMemoryRequirements(device, colors.buffer, &needs);
@@ -111,7 +113,8 @@ int main(int count, char **arguments) {
     vk(vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
     tl(translucent_renderer_record(renderer, commands, 0, 4, NULL), "record");
     vk(vkEndCommandBuffer(commands), "vkEndCommandBuffer");
-    VkSubmitInfo submit = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO, .commandBufferCount = 1, .pCommandBuffers = &commands};
+    VkSubmitInfo submit = {
+        .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO, .commandBufferCount = 1, .pCommandBuffers = &commands};
     for (uint32_t first = 0; first < samples; first += 4) {
         tl(translucent_renderer_set_first_sample(renderer, first), "first sample");
         vk(vkQueueSubmit(queue, 1, &submit, VK_NULL_HANDLE), "vkQueueSubmit");

@@ -1,5 +1,6 @@
 // A Vulkan application in C++ that gives translucent memory of its own, moves the camera between frames without a new
-// renderer, reads times of every kernel, and writes the frames: turntable SCENE.glb OUT-PREFIX [SIZE [SAMPLES [FRAMES]]]
+// renderer, reads times of every kernel, and writes the frames: turntable SCENE.glb OUT-PREFIX [SIZE [SAMPLES
+// [FRAMES]]]
 #include <cmath>
 #include <cstdlib>
 #include <fstream>

@@ -238,12 +238,12 @@ pub struct TranslucentDeviceInfo {
     pub device: VkDevice,
     /// A family with compute, whose queues run what is recorded.
     pub queue_family: u32,
-    /// A queue of that family, or null. translucent_renderer_create, _render and _write submit to it and wait, and nobody
-    /// else may use it meanwhile; recording never does. Without one, buffers that the host fills are in memory that it
-    /// reaches, and _render and _write fail.
+    /// A queue of that family, or null. translucent_renderer_create, _render and _write submit to it and wait, and
+    /// nobody else may use it meanwhile; recording never does. Without one, buffers that the host fills are in memory
+    /// that it reaches, and _render and _write fail.
     pub queue: VkQueue,
-    /// What the device was made with, so that a missing feature is named and VK_EXT_external_memory_host used where it is
-    /// enabled; null: the caller is trusted.
+    /// What the device was made with, so that a missing feature is named and VK_EXT_external_memory_host used where it
+    /// is enabled; null: the caller is trusted.
     pub created_with: *const VkDeviceCreateInfo,
     /// Used for every pipeline; may be null.
     pub pipeline_cache: VkPipelineCache,

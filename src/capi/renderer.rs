@@ -110,9 +110,9 @@ fn slot_of(number: u32) -> Result<Slot, Failure> {
     found.map(|(_, slot)| *slot).ok_or_else(|| argument(format!("{number} is no TranslucentSlot")))
 }
 
-/// A caller's buffer in place of the library's, with the usages STORAGE_BUFFER, TRANSFER_SRC and TRANSFER_DST. It outlives
-/// the renderer. The scene's are written by translucent_renderer_create, which needs a queue for it: the BVH and the order
-/// of its triangles are made on the host.
+/// A caller's buffer in place of the library's, with the usages STORAGE_BUFFER, TRANSFER_SRC and TRANSFER_DST. It
+/// outlives the renderer. The scene's are written by translucent_renderer_create, which needs a queue for it: the BVH
+/// and the order of its triangles are made on the host.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct TranslucentBuffer {
@@ -142,16 +142,16 @@ pub unsafe extern "C" fn translucent_buffer_size(
     })
 }
 
-/// Renders one scene with one set of settings. It may move to another thread, and be used by one at a time; several may be
-/// used at once.
+/// Renders one scene with one set of settings. It may move to another thread, and be used by one at a time; several may
+/// be used at once.
 pub struct TranslucentRenderer {
     renderer: Renderer,
     /// Names of the kernels, for translucent_renderer_timestamp_name.
     names: Vec<(&'static str, CString)>,
 }
 
-/// Makes the pipelines and buffers that rendering needs, and fills them from the scene; device and scene may be destroyed
-/// afterwards. buffers may be null if buffer_count is 0.
+/// Makes the pipelines and buffers that rendering needs, and fills them from the scene; device and scene may be
+/// destroyed afterwards. buffers may be null if buffer_count is 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn translucent_renderer_create(
     device: *const TranslucentDevice,
@@ -191,8 +191,8 @@ pub unsafe extern "C" fn translucent_renderer_destroy(renderer: *mut Translucent
     unsafe { destroy(renderer) }
 }
 
-/// Where the times of a recording go: the dispatch number i writes query first + 2 i before it starts and the next one when
-/// it has ended.
+/// Where the times of a recording go: the dispatch number i writes query first + 2 i before it starts and the next one
+/// when it has ended.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct TranslucentTimestamps {
@@ -204,15 +204,16 @@ pub struct TranslucentTimestamps {
 /// Records the samples begin to end - 1, at most 4096, and the image they make into a command buffer in the recording
 /// state, outside of a render pass. Never submits or waits. timestamps may be null.
 ///
-/// An execution computes the samples f + begin to f + end - 1, where f is the number of translucent_renderer_set_first_sample
-/// (0 at first). Where the sums hold the samples just before those, they are added to them; otherwise the sums start anew.
-/// So a command buffer may be submitted again and again, and nothing is counted twice. Camera, lights and matter are read
-/// from buffers when it executes.
+/// An execution computes the samples f + begin to f + end - 1, where f is the number of
+/// translucent_renderer_set_first_sample (0 at first). Where the sums hold the samples just before those, they are
+/// added to them; otherwise the sums start anew. So a command buffer may be submitted again and again, and nothing is
+/// counted twice. Camera, lights and matter are read from buffers when it executes.
 ///
-/// On entry, what compute shaders and transfers earlier on the same queue wrote is waited for and visible. On exit, all that
-/// was written is visible to compute shaders, transfers and the host; anything else needs a barrier of the caller's from the
-/// stage COMPUTE_SHADER and the access SHADER_STORAGE_WRITE. Executions of one renderer must not overlap. Compute pipeline,
-/// descriptor set 0 and push constants are other ones afterwards. The renderer outlives every execution.
+/// On entry, what compute shaders and transfers earlier on the same queue wrote is waited for and visible. On exit, all
+/// that was written is visible to compute shaders, transfers and the host; anything else needs a barrier of the
+/// caller's from the stage COMPUTE_SHADER and the access SHADER_STORAGE_WRITE. Executions of one renderer must not
+/// overlap. Compute pipeline, descriptor set 0 and push constants are other ones afterwards. The renderer outlives
+/// every execution.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn translucent_renderer_record(
     renderer: *const TranslucentRenderer,
@@ -274,8 +275,8 @@ pub unsafe extern "C" fn translucent_renderer_timestamp_name(
     })
 }
 
-/// Records a copy of TranslucentOutput::colors to the upper left of an image of four floats, first level and layer, which is
-/// in the layout TRANSFER_DST_OPTIMAL or GENERAL when this executes.
+/// Records a copy of TranslucentOutput::colors to the upper left of an image of four floats, first level and layer,
+/// which is in the layout TRANSFER_DST_OPTIMAL or GENERAL when this executes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn translucent_renderer_record_copy(
     renderer: *const TranslucentRenderer,
@@ -289,7 +290,8 @@ pub unsafe extern "C" fn translucent_renderer_record_copy(
     })
 }
 
-/// What recordings leave behind, valid as long as the renderer. Rows run from the top, width pixels each, without padding.
+/// What recordings leave behind, valid as long as the renderer. Rows run from the top, width pixels each, without
+/// padding.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct TranslucentOutput {
@@ -299,8 +301,8 @@ pub struct TranslucentOutput {
     pub height: u32,
     /// Four floats for each pixel: linear Rec.709 light, and alpha; not premultiplied.
     pub colors: VkBuffer,
-    /// Twelve words for each pixel: subsurface light (3 floats), reflected light (3 floats), variance of the mean of the
-    /// former (3 floats), alpha (float), samples, samples left out (unsigned).
+    /// Twelve words for each pixel: subsurface light (3 floats), reflected light (3 floats), variance of the mean of
+    /// the former (3 floats), alpha (float), samples, samples left out (unsigned).
     pub pixels: VkBuffer,
     /// Four unsigned words: f of translucent_renderer_record, first and end of the samples in the sums (the end is
     /// 0xffffffff where they are to be forgotten), and one of the library's. A transfer of the caller's may write f.
@@ -516,8 +518,8 @@ pub unsafe extern "C" fn translucent_renderer_samples(
     })
 }
 
-/// Writes the image, recorded or rendered, with every channel to an EXR file: all of it or nothing. Submits to the device's
-/// queue and waits.
+/// Writes the image, recorded or rendered, with every channel to an EXR file: all of it or nothing. Submits to the
+/// device's queue and waits.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn translucent_renderer_write(
     renderer: *mut TranslucentRenderer,

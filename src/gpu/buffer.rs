@@ -128,8 +128,9 @@ impl Buffer {
     /// A buffer whose memory is the caller's own: the device reads and writes it in place.
     ///
     /// # Errors
-    /// [`Error::Device`] where VK_EXT_external_memory_host is not enabled; [`Error::Memory`] for an address or size that
-    /// is no multiple of [`Device::host_import_alignment`], or memory that the device cannot import; [`Error::Vulkan`].
+    /// [`Error::Device`] where VK_EXT_external_memory_host is not enabled; [`Error::Memory`] for an address or size
+    /// that is no multiple of [`Device::host_import_alignment`], or memory that the device cannot import;
+    /// [`Error::Vulkan`].
     ///
     /// # Safety
     /// The memory is valid for reads and writes and outlives this value and all bindings and recordings that use it.

@@ -5,8 +5,8 @@ use crate::shared::Step;
 use ash::vk;
 use std::{ffi::CStr, sync::Arc};
 
-/// Where the times of a recording go: the dispatch number i writes query `first + 2 i` before it starts and the next one
-/// when it has ended.
+/// Where the times of a recording go: the dispatch number i writes query `first + 2 i` before it starts and the next
+/// one when it has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timestamps {
     /// A pool of VK_QUERY_TYPE_TIMESTAMP.
@@ -24,9 +24,9 @@ impl Commands {
     /// A caller's command buffer.
     ///
     /// # Safety
-    /// Until the last use of this value, `raw` is a command buffer of this device and its queue family, in the recording
-    /// state, outside of a render pass, and used by no other thread. Until every execution of it has ended, all kernels,
-    /// bindings, buffers, images and queries that are given to its methods are alive.
+    /// Until the last use of this value, `raw` is a command buffer of this device and its queue family, in the
+    /// recording state, outside of a render pass, and used by no other thread. Until every execution of it has ended,
+    /// all kernels, bindings, buffers, images and queries that are given to its methods are alive.
     pub unsafe fn of(device: &Device, raw: vk::CommandBuffer) -> Commands {
         Commands { handles: device.handles.clone(), raw }
     }
@@ -107,7 +107,8 @@ impl Commands {
         let layout = kernel.objects.layout.objects.pipeline;
         let (device, commands) = (&self.handles.device, self.raw);
         self.begin_label(&kernel.objects.label);
-        // SAFETY: the recording is open; kernel and bindings have layouts of one definition, are of this device and outlive it.
+        // SAFETY: the recording is open; kernel and bindings have layouts of one definition, are of this device and
+        // outlive it.
         unsafe {
             device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, kernel.objects.pipeline);
             let sets = [bindings.objects.set];
@@ -153,8 +154,8 @@ impl Commands {
         self.barrier();
     }
 
-    /// Copies the start of `source`, tightly packed texels, to the upper left `width` x `height` texels of the first level
-    /// and layer of a colour image in `layout`.
+    /// Copies the start of `source`, tightly packed texels, to the upper left `width` x `height` texels of the first
+    /// level and layer of a colour image in `layout`.
     ///
     /// # Panics
     /// If the buffer is shorter than texels of `texel_bytes` bytes need, or of another device.

@@ -44,11 +44,13 @@ pub struct RawDevice<'a> {
     pub device: ash::Device,
     /// A family with compute, whose queues run what is recorded.
     pub queue_family: u32,
-    /// A queue of that family, to which [`Renderer::new`](crate::Renderer::new), `render` and `image` submit; recordings
-    /// never do. Without one, buffers that the host fills are in memory that it reaches, and `render` is an error.
+    /// A queue of that family, to which [`Renderer::new`](crate::Renderer::new), `render` and `image` submit;
+    /// recordings never do. Without one, buffers that the host fills are in memory that it reaches, and `render` is an
+    /// error.
     pub queue: Option<vk::Queue>,
-    /// What the device was made with, so that a missing feature is an error that names it and VK_EXT_external_memory_host
-    /// is used where it is enabled; without it the caller is trusted and the extension not used.
+    /// What the device was made with, so that a missing feature is an error that names it and
+    /// VK_EXT_external_memory_host is used where it is enabled; without it the caller is trusted and the extension not
+    /// used.
     pub created_with: Option<&'a vk::DeviceCreateInfo<'a>>,
     /// VK_EXT_debug_utils is enabled in the instance: objects get names and dispatches labels.
     pub debug_utils: bool,
@@ -184,8 +186,8 @@ impl Device {
     ///
     /// # Safety
     /// The handles are alive and belong together. Without `created_with` the features of [`Requirements`] are enabled.
-    /// While a method of this crate runs that submits (those that the documentation of `RawDevice::queue` names), nobody
-    /// else uses the queue.
+    /// While a method of this crate runs that submits (those that the documentation of `RawDevice::queue` names),
+    /// nobody else uses the queue.
     pub unsafe fn from_raw(raw: RawDevice) -> Result<Device> {
         requirements::check_version(&raw.instance, &raw.device, raw.physical)?;
         let info = describe(&raw.instance, 0, raw.physical).info;
@@ -256,8 +258,8 @@ impl Device {
         self.handles.heap_bytes
     }
 
-    /// Of which number (bytes) address and size of memory for [`Buffer::import_host`](super::Buffer::import_host) must be
-    /// multiples; none where VK_EXT_external_memory_host is not enabled.
+    /// Of which number (bytes) address and size of memory for [`Buffer::import_host`](super::Buffer::import_host) must
+    /// be multiples; none where VK_EXT_external_memory_host is not enabled.
     pub fn host_import_alignment(&self) -> Option<u64> {
         self.handles.host_memory.as_ref().map(|host| host.alignment)
     }

@@ -229,8 +229,8 @@ impl Kernel {
         Ok(Kernel { objects: Arc::new(objects) })
     }
 
-    /// As [`Kernel::new`], once for each device: whoever asks for the same again shares what was compiled. A device keeps
-    /// all that it compiled, a few hundred kilobytes each, as long as it lives.
+    /// As [`Kernel::new`], once for each device: whoever asks for the same again shares what was compiled. A device
+    /// keeps all that it compiled, a few hundred kilobytes each, as long as it lives.
     ///
     /// # Errors
     /// As [`Kernel::new`].

@@ -59,8 +59,8 @@ impl Requirements {
         }
     }
 
-    /// `create` with the features chained to it. Whoever chains structures of Vulkan 1.2 and 1.3 already sets the features
-    /// there instead, by [`Requirements::enable`]: a structure may stand in a chain once.
+    /// `create` with the features chained to it. Whoever chains structures of Vulkan 1.2 and 1.3 already sets the
+    /// features there instead, by [`Requirements::enable`]: a structure may stand in a chain once.
     pub fn chain<'a>(&'a mut self, create: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
         create.push_next(&mut self.features12).push_next(&mut self.features13)
     }

@@ -18,8 +18,8 @@ pub enum Sums {
     Freed,
 }
 
-/// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z, samples,
-/// material.
+/// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z,
+/// samples, material.
 pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     renderer.catch_up();
     let view = renderer.prepared.view;

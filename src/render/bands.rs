@@ -19,8 +19,8 @@ pub struct Band {
     /// End of the samples in its sums.
     pub end: u32,
     pub film: Film,
-    /// RunningSums and BatchSums as bytes, if they are on the host. Allocated once: bands that take turns would leave the
-    /// allocator holes that it does not give back.
+    /// RunningSums and BatchSums as bytes, if they are on the host. Allocated once: bands that take turns would leave
+    /// the allocator holes that it does not give back.
     pub sums: [Vec<u8>; 2],
 }
 

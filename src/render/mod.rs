@@ -76,8 +76,8 @@ pub struct Progress {
 
 /// Renders one scene with one set of settings. Samples add up over calls until [`Renderer::reset`].
 ///
-/// It may move to another thread, and be used by one at a time; several renderers, on one device or several, may be used
-/// at once.
+/// It may move to another thread, and be used by one at a time; several renderers, on one device or several, may be
+/// used at once.
 pub struct Renderer {
     device: Device,
     frame: Frame,
@@ -369,8 +369,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// The image of the samples so far, with every channel and attribute. Every value is finite: a mean or variance beyond
-    /// f32 is its largest number, and samples that would overflow a sum are left out and counted (`invalidSamples`).
+    /// The image of the samples so far, with every channel and attribute. Every value is finite: a mean or variance
+    /// beyond f32 is its largest number, and samples that would overflow a sum are left out and counted
+    /// (`invalidSamples`).
     pub fn image(&mut self) -> Result<Image> {
         assemble::image(self, assemble::Sums::Kept)
     }
@@ -413,7 +414,8 @@ impl Kernels {
         }
         dispatch(&self.sample, &step);
         dispatch(&self.reproject, &step);
-        // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty portion.
+        // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty
+        // portion.
         for begin in (0..prepared.ray_count.max(1)).step_by(MAX_RAYS as usize) {
             step.ray_begin = begin;
             step.ray_count = (prepared.ray_count - begin.min(prepared.ray_count)).min(MAX_RAYS);

@@ -22,39 +22,39 @@ pub struct Output {
     pub colors: vk::Buffer,
     /// A [`Pixel`] each: layers, variance, samples.
     pub pixels: vk::Buffer,
-    /// One [`Progress`]: which samples the sums hold, and from which sample recordings count theirs. A caller's transfer
-    /// may write the word `first` between recordings.
+    /// One [`Progress`]: which samples the sums hold, and from which sample recordings count theirs. A caller's
+    /// transfer may write the word `first` between recordings.
     pub progress: vk::Buffer,
 }
 
 impl Renderer {
-    /// Records `samples` samples and the image they make into `commands`; never submits, waits or changes this value, so
-    /// one renderer may record any number of command buffers, and each may be recorded once and submitted again and again.
-    /// Needs [`Settings::recording`](crate::Settings::recording).
+    /// Records `samples` samples and the image they make into `commands`; never submits, waits or changes this value,
+    /// so one renderer may record any number of command buffers, and each may be recorded once and submitted again and
+    /// again. Needs [`Settings::recording`](crate::Settings::recording).
     ///
-    /// *What an execution does.* With f = [`Progress::first`] (0 unless [`Renderer::set_first_sample`] or a transfer changed
-    /// it), it computes the samples f + start to f + end. Where the sums hold the samples just before those, they are
-    /// added to them; otherwise the sums start anew. So nothing is ever counted twice: 0..64 executed twice is the same
-    /// image twice, bit for bit, and 0..8, 8..16 one after the other is the image of 0..16. Camera, lights and materials
-    /// are read from buffers when it executes ([`Renderer::set_camera`] and so on). The dispatches do not depend on any of
-    /// it.
+    /// *What an execution does.* With f = [`Progress::first`] (0 unless [`Renderer::set_first_sample`] or a transfer
+    /// changed it), it computes the samples f + start to f + end. Where the sums hold the samples just before those,
+    /// they are added to them; otherwise the sums start anew. So nothing is ever counted twice: 0..64 executed twice is
+    /// the same image twice, bit for bit, and 0..8, 8..16 one after the other is the image of 0..16. Camera, lights and
+    /// materials are read from buffers when it executes ([`Renderer::set_camera`] and so on). The dispatches do not
+    /// depend on any of it.
     ///
-    /// *Synchronisation.* On entry, what compute shaders and transfers earlier on the same queue wrote is waited for and
-    /// visible. On exit, all that was written is visible to compute shaders, transfers and the host; anything else, such
-    /// as sampling the image while drawing, needs a barrier of the caller's from the stage COMPUTE_SHADER and the access
-    /// SHADER_STORAGE_WRITE ([`Renderer::record_copy`]: ALL_TRANSFER and TRANSFER_WRITE). Executions of one renderer must
-    /// not overlap: on one queue they do not; between queues semaphores see to it.
+    /// *Synchronisation.* On entry, what compute shaders and transfers earlier on the same queue wrote is waited for
+    /// and visible. On exit, all that was written is visible to compute shaders, transfers and the host; anything else,
+    /// such as sampling the image while drawing, needs a barrier of the caller's from the stage COMPUTE_SHADER and the
+    /// access SHADER_STORAGE_WRITE ([`Renderer::record_copy`]: ALL_TRANSFER and TRANSFER_WRITE). Executions of one
+    /// renderer must not overlap: on one queue they do not; between queues semaphores see to it.
     ///
     /// *State.* Compute pipeline, descriptor set 0 and push constants are other ones afterwards.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a range that is empty or of more than [`MAX_RECORDED`] samples, or a renderer that was made
-    /// without `recording`.
+    /// [`Error::Setting`] for a range that is empty or of more than [`MAX_RECORDED`] samples, or a renderer that was
+    /// made without `recording`.
     ///
     /// # Safety
     /// `commands` is of this device and queue family, in the recording state, outside of a render pass, and used by no
-    /// other thread meanwhile. The renderer lives until every execution has ended; it is not used by `&mut` while one is
-    /// going on.
+    /// other thread meanwhile. The renderer lives until every execution has ended; it is not used by `&mut` while one
+    /// is going on.
     #[expect(unsafe_code, reason = "the command buffer is the caller's, and so is its contract")]
     pub unsafe fn record(&self, commands: vk::CommandBuffer, samples: Range<u32>) -> Result<()> {
         // SAFETY: as the caller promises.
@@ -125,15 +125,15 @@ impl Renderer {
         Ok(names)
     }
 
-    /// Records a copy of [`Output::colors`] to the upper left of an image: first level and layer, a format of four f32, in
-    /// the layout TRANSFER_DST_OPTIMAL or GENERAL.
+    /// Records a copy of [`Output::colors`] to the upper left of an image: first level and layer, a format of four f32,
+    /// in the layout TRANSFER_DST_OPTIMAL or GENERAL.
     ///
     /// # Errors
     /// [`Error::Setting`] for a renderer that was made without `recording`.
     ///
     /// # Safety
-    /// As [`Renderer::record`]; the image has the format, the usage TRANSFER_DST and at least the size of [`Output`], and
-    /// is in that layout when this executes.
+    /// As [`Renderer::record`]; the image has the format, the usage TRANSFER_DST and at least the size of [`Output`],
+    /// and is in that layout when this executes.
     #[expect(unsafe_code, reason = "command buffer and image are the caller's, and so is their contract")]
     pub unsafe fn record_copy(
         &self,

@@ -1,5 +1,5 @@
-//! Somebody else's Vulkan application: its own instance, device, queue, command buffers and timeline semaphore, under the
-//! validation layer with synchronization checks.
+//! Somebody else's Vulkan application: its own instance, device, queue, command buffers and timeline semaphore, under
+//! the validation layer with synchronization checks.
 
 use std::{
     ffi::{CStr, c_void},

@@ -35,7 +35,8 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Functions that make and destroy objects, counted. All of a kind have the same arguments but for the types of pointers.
+/// Functions that make and destroy objects, counted. All of a kind have the same arguments but for the types of
+/// pointers.
 macro_rules! counted {
     ($($kind:ident: $create:literal, $destroy:literal;)*) => {
         $(mod $kind {

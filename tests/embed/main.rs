@@ -1,5 +1,5 @@
-//! The library inside somebody else's Vulkan application. Every test ends with a silent validation layer, after the device
-//! is gone.
+//! The library inside somebody else's Vulkan application. Every test ends with a silent validation layer, after the
+//! device is gone.
 
 mod app;
 mod c;
