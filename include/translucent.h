@@ -1,9 +1,9 @@
 // translucent in C. Made from src/capi by cbindgen; do not edit.
 //
-// Pointers are valid for the call that takes them unless a comment says otherwise, and may be null only where it says so.
-// Every struct with struct_size begins with its own sizeof, which tells the library what the caller knows.
-// Handles come from *_create and go to *_destroy, once. A handle may move to another thread; one thread at a time may use
-// it, unless its type says otherwise. There is no global state, but each thread's last error.
+// Pointers are valid for the call that takes them unless a comment says otherwise, and may be null only where it says
+// so. Every struct with struct_size begins with its own sizeof, which tells the library what the caller knows.
+// Handles come from *_create and go to *_destroy, once. A handle may move to another thread; one thread at a time may
+// use it, unless its type says otherwise. There is no global state, but each thread's last error.
 
 
 #pragma once
@@ -71,8 +71,8 @@ typedef enum TranslucentLightKind {
 // A device. May be used from several threads at once.
 typedef struct TranslucentDevice TranslucentDevice;
 
-// Renders one scene with one set of settings. It may move to another thread, and be used by one at a time; several may be
-// used at once.
+// Renders one scene with one set of settings. It may move to another thread, and be used by one at a time; several may
+// be used at once.
 typedef struct TranslucentRenderer TranslucentRenderer;
 
 // A checked scene, without Vulkan. May be used from several threads at once, but not while it changes.
@@ -139,12 +139,12 @@ typedef struct TranslucentDeviceInfo {
   VkDevice device;
   // A family with compute, whose queues run what is recorded.
   uint32_t queue_family;
-  // A queue of that family, or null. translucent_renderer_create, _render and _write submit to it and wait, and nobody
-  // else may use it meanwhile; recording never does. Without one, buffers that the host fills are in memory that it
-  // reaches, and _render and _write fail.
+  // A queue of that family, or null. translucent_renderer_create, _render and _write submit to it and wait, and
+  // nobody else may use it meanwhile; recording never does. Without one, buffers that the host fills are in memory
+  // that it reaches, and _render and _write fail.
   VkQueue queue;
-  // What the device was made with, so that a missing feature is named and VK_EXT_external_memory_host used where it is
-  // enabled; null: the caller is trusted.
+  // What the device was made with, so that a missing feature is named and VK_EXT_external_memory_host used where it
+  // is enabled; null: the caller is trusted.
   const VkDeviceCreateInfo *created_with;
   // Used for every pipeline; may be null.
   VkPipelineCache pipeline_cache;
@@ -175,9 +175,9 @@ typedef struct TranslucentSettings {
   const char *camera;
 } TranslucentSettings;
 
-// A caller's buffer in place of the library's, with the usages STORAGE_BUFFER, TRANSFER_SRC and TRANSFER_DST. It outlives
-// the renderer. The scene's are written by translucent_renderer_create, which needs a queue for it: the BVH and the order
-// of its triangles are made on the host.
+// A caller's buffer in place of the library's, with the usages STORAGE_BUFFER, TRANSFER_SRC and TRANSFER_DST. It
+// outlives the renderer. The scene's are written by translucent_renderer_create, which needs a queue for it: the BVH
+// and the order of its triangles are made on the host.
 typedef struct TranslucentBuffer {
   // A TranslucentSlot.
   uint32_t slot;
@@ -185,15 +185,16 @@ typedef struct TranslucentBuffer {
   VkDeviceSize size;
 } TranslucentBuffer;
 
-// Where the times of a recording go: the dispatch number i writes query first + 2 i before it starts and the next one when
-// it has ended.
+// Where the times of a recording go: the dispatch number i writes query first + 2 i before it starts and the next one
+// when it has ended.
 typedef struct TranslucentTimestamps {
   // A pool of VK_QUERY_TYPE_TIMESTAMP. The recording resets the queries that it writes.
   VkQueryPool pool;
   uint32_t first;
 } TranslucentTimestamps;
 
-// What recordings leave behind, valid as long as the renderer. Rows run from the top, width pixels each, without padding.
+// What recordings leave behind, valid as long as the renderer. Rows run from the top, width pixels each, without
+// padding.
 typedef struct TranslucentOutput {
   // sizeof(TranslucentOutput), set by the caller; the rest is filled in.
   size_t struct_size;
@@ -201,8 +202,8 @@ typedef struct TranslucentOutput {
   uint32_t height;
   // Four floats for each pixel: linear Rec.709 light, and alpha; not premultiplied.
   VkBuffer colors;
-  // Twelve words for each pixel: subsurface light (3 floats), reflected light (3 floats), variance of the mean of the
-  // former (3 floats), alpha (float), samples, samples left out (unsigned).
+  // Twelve words for each pixel: subsurface light (3 floats), reflected light (3 floats), variance of the mean of
+  // the former (3 floats), alpha (float), samples, samples left out (unsigned).
   VkBuffer pixels;
   // Four unsigned words: f of translucent_renderer_record, first and end of the samples in the sums (the end is
   // 0xffffffff where they are to be forgotten), and one of the library's. A transfer of the caller's may write f.
@@ -307,8 +308,8 @@ enum TranslucentResult translucent_buffer_size(const struct TranslucentScene *sc
                                                uint32_t slot,
                                                VkDeviceSize *size);
 
-// Makes the pipelines and buffers that rendering needs, and fills them from the scene; device and scene may be destroyed
-// afterwards. buffers may be null if buffer_count is 0.
+// Makes the pipelines and buffers that rendering needs, and fills them from the scene; device and scene may be
+// destroyed afterwards. buffers may be null if buffer_count is 0.
 enum TranslucentResult translucent_renderer_create(const struct TranslucentDevice *device,
                                                    const struct TranslucentScene *scene,
                                                    const struct TranslucentSettings *settings,
@@ -322,15 +323,16 @@ void translucent_renderer_destroy(struct TranslucentRenderer *renderer);
 // Records the samples begin to end - 1, at most 4096, and the image they make into a command buffer in the recording
 // state, outside of a render pass. Never submits or waits. timestamps may be null.
 //
-// An execution computes the samples f + begin to f + end - 1, where f is the number of translucent_renderer_set_first_sample
-// (0 at first). Where the sums hold the samples just before those, they are added to them; otherwise the sums start anew.
-// So a command buffer may be submitted again and again, and nothing is counted twice. Camera, lights and matter are read
-// from buffers when it executes.
+// An execution computes the samples f + begin to f + end - 1, where f is the number of
+// translucent_renderer_set_first_sample (0 at first). Where the sums hold the samples just before those, they are
+// added to them; otherwise the sums start anew. So a command buffer may be submitted again and again, and nothing is
+// counted twice. Camera, lights and matter are read from buffers when it executes.
 //
-// On entry, what compute shaders and transfers earlier on the same queue wrote is waited for and visible. On exit, all that
-// was written is visible to compute shaders, transfers and the host; anything else needs a barrier of the caller's from the
-// stage COMPUTE_SHADER and the access SHADER_STORAGE_WRITE. Executions of one renderer must not overlap. Compute pipeline,
-// descriptor set 0 and push constants are other ones afterwards. The renderer outlives every execution.
+// On entry, what compute shaders and transfers earlier on the same queue wrote is waited for and visible. On exit, all
+// that was written is visible to compute shaders, transfers and the host; anything else needs a barrier of the
+// caller's from the stage COMPUTE_SHADER and the access SHADER_STORAGE_WRITE. Executions of one renderer must not
+// overlap. Compute pipeline, descriptor set 0 and push constants are other ones afterwards. The renderer outlives
+// every execution.
 enum TranslucentResult translucent_renderer_record(const struct TranslucentRenderer *renderer,
                                                    VkCommandBuffer commands,
                                                    uint32_t begin,
@@ -350,8 +352,8 @@ enum TranslucentResult translucent_renderer_timestamp_name(const struct Transluc
                                                            uint32_t index,
                                                            const char **name);
 
-// Records a copy of TranslucentOutput::colors to the upper left of an image of four floats, first level and layer, which is
-// in the layout TRANSFER_DST_OPTIMAL or GENERAL when this executes.
+// Records a copy of TranslucentOutput::colors to the upper left of an image of four floats, first level and layer,
+// which is in the layout TRANSFER_DST_OPTIMAL or GENERAL when this executes.
 enum TranslucentResult translucent_renderer_record_copy(const struct TranslucentRenderer *renderer,
                                                         VkCommandBuffer commands,
                                                         VkImage image,
@@ -386,10 +388,9 @@ enum TranslucentResult translucent_renderer_samples(const struct TranslucentRend
                                                     uint32_t *begin,
                                                     uint32_t *end);
 
-// Writes the image, recorded or rendered, with every channel to an EXR file: all of it or nothing. Submits to the device's
-// queue and waits.
-enum TranslucentResult translucent_renderer_write(struct TranslucentRenderer *renderer,
-                                                  const char *file);
+// Writes the image, recorded or rendered, with every channel to an EXR file: all of it or nothing. Submits to the
+// device's queue and waits.
+enum TranslucentResult translucent_renderer_write(struct TranslucentRenderer *renderer, const char *file);
 
 // Reads and checks a scene.
 enum TranslucentResult translucent_scene_create(const struct TranslucentSceneInfo *info, struct TranslucentScene **out);
