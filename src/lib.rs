@@ -75,8 +75,7 @@
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
 //! Unsafe code is denied outside of `gpu`, but for [`Renderer::record`], whose command buffer is the caller's. The C
-//! interface is a package of its own, `src/capi`, which sees this public interface alone; `include/translucent.h` is made
-//! of it.
+//! interface is a package of its own, `src/capi`, which sees this public interface alone; its header is made of it.
 //!
 //! The extremes that renders survive, each with its test, are in [`extremes`].
 //!

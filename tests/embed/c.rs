@@ -8,7 +8,7 @@ use std::{
 };
 use translucent::{Environment, Image, Model, Renderer, Scene, Settings};
 
-const HEADER: &str = "include/translucent.h";
+const HEADER: &str = "src/capi/include/translucent.h";
 
 /// The header that cbindgen makes of the sources.
 fn header() -> String {
@@ -31,7 +31,7 @@ fn header_in_the_repository_is_fresh() {
 
 #[test]
 fn versions_agree() {
-    let package = fs::read_to_string("include/translucent.pc").expect("it is in the repository");
+    let package = fs::read_to_string("src/capi/include/translucent.pc").expect("it is in the repository");
     assert!(package.contains(&format!("Version: {}\n", env!("CARGO_PKG_VERSION"))));
     let capi = fs::read_to_string("src/capi/Cargo.toml").expect("it is in the repository");
     assert!(capi.contains(&format!("version = \"{}\"\n", env!("CARGO_PKG_VERSION"))));
@@ -58,9 +58,9 @@ fn installed(name: &str) -> PathBuf {
     for (from, to) in [
         (built.join("libtranslucent.so"), "lib/libtranslucent.so"),
         (built.join("libtranslucent.a"), "lib/libtranslucent.a"),
-        (HEADER.into(), HEADER),
-        ("include/translucent.pc".into(), "lib/pkgconfig/translucent.pc"),
-        ("include/translucent-config.cmake".into(), "lib/cmake/translucent/translucent-config.cmake"),
+        (HEADER.into(), "include/translucent.h"),
+        ("src/capi/include/translucent.pc".into(), "lib/pkgconfig/translucent.pc"),
+        ("src/capi/include/translucent-config.cmake".into(), "lib/cmake/translucent/translucent-config.cmake"),
     ] {
         let to = prefix.join(to);
         fs::create_dir_all(to.parent().expect("it has one")).expect("a folder");
