@@ -12,7 +12,7 @@ use crate::{
         texture,
     },
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Set, Wrap},
-    settings::{Model, Projection, Settings},
+    settings::{Directional, Model, Projection, Settings},
     shared::{
         self, Emitter, Features, Light, MODEL_LAMBERT, Material, TABLE_NODES, TRANSLUCENT, TWO_SIDED, Texture, View,
     },
@@ -115,9 +115,6 @@ pub fn resolution(scene: &Scene, settings: &Settings) -> Result<(u32, u32)> {
 /// moves by less than 1e-4 of the radius, or is as good as lost.
 const MEAN_FREE_PATH: (f64, f64) = (1.0 / (1 << 17) as f64, 1e9);
 
-/// Largest kappa of the directional dipole: from there on its real source is nowhere near its depth.
-const KAPPA_MAX: f64 = 100.0;
-
 /// Longest side of an image (pixels).
 pub const MAX_SIDE: u32 = 65_536;
 
@@ -134,8 +131,10 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     if !(1..=65_536).contains(&settings.directions) {
         return Err(Error::setting("directions", format!("{} is not between 1 and 65536", settings.directions)));
     }
-    if !(settings.directional.kappa >= 0.0 && settings.directional.kappa <= KAPPA_MAX) {
-        return Err(Error::setting("kappa", format!("{} is not in [0, {KAPPA_MAX}]", settings.directional.kappa)));
+    if let Some(Directional { kappa, .. }) = settings.directional
+        && !(0.0..=Directional::KAPPA_MAX).contains(&kappa)
+    {
+        return Err(Error::setting("kappa", format!("{kappa} is not in [0, {}]", Directional::KAPPA_MAX)));
     }
     if !(settings.radius_tail >= 0.0 && settings.radius_tail < 0.1) {
         return Err(Error::setting("radius tail", format!("{} is not in [0, 0.1)", settings.radius_tail)));
@@ -506,7 +505,7 @@ fn material(
             let options = profile::Options {
                 normalisation: settings.normalisation,
                 radius_tail: settings.radius_tail,
-                directional: settings.directional,
+                directional: settings.directional.or(medium.directional).unwrap_or_default(),
             };
             let mut out = match choice.model {
                 Model::Table => {

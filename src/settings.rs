@@ -80,7 +80,8 @@ impl FromStr for Model {
     }
 }
 
-/// What may be changed about the directional dipole.
+/// What may be changed about the directional dipole: by the settings, else in the file by `renormalise`, `reciprocal` and
+/// `kappa` beside `model`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Directional {
     /// Scales each channel so that a plane under diffuse light gives back what it gives with the standard dipole.
@@ -88,8 +89,13 @@ pub struct Directional {
     /// Averages it with itself, light and eye exchanged: reciprocal, as the published model is not.
     pub reciprocal: bool,
     /// The real source is at least kappa / (3 sigma_t) from the exit also where the published model puts it there, and
-    /// meshes and normal maps show fireflies; 0 is the published model. At least 0; 1 makes the distance continuous.
+    /// meshes and normal maps show fireflies; 0 is the published model. From 0 to [`Directional::KAPPA_MAX`]; 1 makes the distance continuous.
     pub kappa: f64,
+}
+
+impl Directional {
+    /// Largest kappa: from there on the real source is nowhere near its depth.
+    pub const KAPPA_MAX: f64 = 100.0;
 }
 
 impl Default for Directional {
@@ -158,7 +164,8 @@ pub struct Settings {
     pub normalisation: Normalisation,
     /// Profile of every translucent material; `Auto` leaves it to each.
     pub model: Model,
-    pub directional: Directional,
+    /// Of every material with the directional dipole; without it what its file says, else the defaults.
+    pub directional: Option<Directional>,
     /// Lets the table model follow how thick the body is at each point; without, every body is a half-space to it.
     pub curvature: bool,
     /// Single scattering of every translucent material; `Auto` leaves it to each.
@@ -193,7 +200,7 @@ impl Default for Settings {
             projection: Projection::Mis,
             normalisation: Normalisation::Energy,
             model: Model::Auto,
-            directional: Directional::default(),
+            directional: None,
             curvature: true,
             single_scattering: SingleScattering::Auto,
             seed: 0,

@@ -35,15 +35,17 @@ pub struct SceneOptions {
     /// recommends; lambert is the opaque limit, where light leaves where it entered.
     #[arg(long, default_value = "auto", value_parser = models())]
     model: Model,
-    /// Scale the directional dipole so that it gives back no more light than the standard one.
+    /// Scale the directional dipole so that it gives back no more light than the standard one. Each of this, --reciprocal
+    /// and --kappa takes the place of all that the file says about it.
     #[arg(long)]
     renormalise: bool,
     /// Average the directional dipole with itself, light and eye exchanged.
     #[arg(long)]
     reciprocal: bool,
     /// Regularisation of the directional dipole near its source; 0 is the published model, with its fireflies.
-    #[arg(long, value_name = "K", default_value_t = 1.0, allow_negative_numbers = true, value_parser = arguments::not_negative)]
-    kappa: f64,
+    /// Without it 1.
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = arguments::not_negative)]
+    kappa: Option<f64>,
     /// Whether the table model follows how thick the body is at each point, or takes every body for a half-space.
     #[arg(long, value_name = "on|off", default_value = "on", action = clap::ArgAction::Set, value_parser = on_off())]
     curvature: bool,
@@ -162,12 +164,20 @@ impl SceneOptions {
             projection: self.projection,
             normalisation: self.normalisation,
             model: self.model,
-            directional: Directional { renormalise: self.renormalise, reciprocal: self.reciprocal, kappa: self.kappa },
+            directional: self.directional(),
             curvature: self.curvature,
             single_scattering: self.single_scattering,
             show_environment: self.show_environment,
             ..Settings::default()
         }
+    }
+
+    /// What the options say of the directional dipole, if any does.
+    fn directional(&self) -> Option<Directional> {
+        let SceneOptions { renormalise, reciprocal, kappa, .. } = *self;
+        let default = Directional::default();
+        let asked = renormalise || reciprocal || kappa.is_some();
+        asked.then(|| Directional { renormalise, reciprocal, kappa: kappa.unwrap_or(default.kappa) })
     }
 
     /// Refuses to write over a file that is read.

@@ -180,9 +180,10 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
         "model": settings.model.to_string(),
-        "renormalise": settings.directional.renormalise,
-        "reciprocal": settings.directional.reciprocal,
-        "kappa": settings.directional.kappa,
+        // Null where the file decides.
+        "renormalise": settings.directional.map(|directional| directional.renormalise),
+        "reciprocal": settings.directional.map(|directional| directional.reciprocal),
+        "kappa": settings.directional.map(|directional| directional.kappa),
         "curvature": settings.curvature,
         "singleScattering": settings.single_scattering.to_string(),
         "radiusTail": settings.radius_tail,

@@ -1,6 +1,7 @@
 //! One number for a scene: SHA-256 of everything that determines the image.
 
 use super::{EnvironmentMap, Lens, LightKind, Scene};
+use crate::settings::Directional;
 use sha2::{Digest, Sha256};
 
 /// Feeds numbers in a fixed order, each list preceded by its length.
@@ -44,6 +45,9 @@ pub(super) fn hash(scene: &Scene) -> String {
             feed.numbers(medium.g.to_array());
             feed.count(medium.model.map_or(0, |model| 1 + model as usize));
             feed.count(medium.single_scattering as usize);
+            if let Some(Directional { renormalise, reciprocal, kappa }) = medium.directional {
+                feed.numbers([f64::from(u8::from(renormalise)), f64::from(u8::from(reciprocal)), kappa]);
+            }
             if let Some(appearance) = &medium.appearance {
                 feed.numbers(appearance.albedo.to_array());
                 feed.numbers(appearance.length.to_array());

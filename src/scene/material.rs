@@ -14,7 +14,7 @@ use crate::shared::{
 };
 use crate::{
     Error, Result,
-    settings::{Model, SingleScattering},
+    settings::{Directional, Model, SingleScattering},
 };
 use glam::DVec3;
 use std::path::Path;
@@ -43,6 +43,9 @@ const BSSRDF_KEYS: &[&str] = &[
     "ior",
     "g",
     "model",
+    "renormalise",
+    "reciprocal",
+    "kappa",
     "single_scattering",
     "surface",
     "set",
@@ -290,6 +293,7 @@ fn medium_of(preset: &Preset) -> Medium {
         g: preset.g,
         appearance: None,
         model: None,
+        directional: None,
         single_scattering: SingleScattering::Auto,
         source: format!("preset {}", preset.name),
     }
@@ -343,8 +347,16 @@ fn read_bssrdf(item: &Item, authored_ior: Option<f64>, material: &mut Material) 
         };
         let source = "extras.bssrdf".into();
         let single_scattering = SingleScattering::Auto;
-        material.medium =
-            Some(Medium { sigma_s_prime, sigma_a, g, appearance, model: None, single_scattering, source });
+        material.medium = Some(Medium {
+            sigma_s_prime,
+            sigma_a,
+            g,
+            appearance,
+            model: None,
+            directional: None,
+            single_scattering,
+            source,
+        });
     }
 
     if let Some(model) = item.get("model")? {
@@ -353,6 +365,9 @@ fn read_bssrdf(item: &Item, authored_ior: Option<f64>, material: &mut Material) 
         if let Some(medium) = &mut material.medium {
             medium.model = Some(chosen);
         }
+    }
+    if let Some(medium) = &mut material.medium {
+        medium.directional = read_directional(item)?;
     }
     if let Some(single) = item.get("single_scattering")? {
         let chosen = super::json::shorten(single.string()?).parse().map_err(|problem: String| single.error(problem))?;
@@ -371,6 +386,22 @@ fn read_bssrdf(item: &Item, authored_ior: Option<f64>, material: &mut Material) 
         }
     }
     Ok(())
+}
+
+/// `renormalise` and `reciprocal` (true or false) and `kappa` of the directional dipole; those left out are the defaults,
+/// and nothing without any.
+fn read_directional(item: &Item) -> Result<Option<Directional>> {
+    let [renormalise, reciprocal, kappa] = ["renormalise", "reciprocal", "kappa"].map(|key| item.get(key));
+    let (renormalise, reciprocal, kappa) = (renormalise?, reciprocal?, kappa?);
+    if renormalise.is_none() && reciprocal.is_none() && kappa.is_none() {
+        return Ok(None);
+    }
+    let default = Directional::default();
+    Ok(Some(Directional {
+        renormalise: renormalise.map_or(Ok(default.renormalise), |item| item.boolean())?,
+        reciprocal: reciprocal.map_or(Ok(default.reciprocal), |item| item.boolean())?,
+        kappa: kappa.map_or(Ok(default.kappa), |item| item.within(0.0, Directional::KAPPA_MAX))?,
+    }))
 }
 
 /// Says where a medium scatters too little for the model.

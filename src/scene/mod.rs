@@ -28,7 +28,7 @@ pub(crate) use check::{check_camera, check_light};
 
 use crate::{
     Error, Result,
-    settings::{Model, SingleScattering},
+    settings::{Directional, Model, SingleScattering},
     shared,
 };
 use glam::DVec3;
@@ -301,6 +301,8 @@ pub struct Medium {
     pub appearance: Option<Appearance>,
     /// The profile that the file names.
     pub model: Option<Model>,
+    /// What the file says about the directional dipole.
+    pub directional: Option<Directional>,
     /// What the file says about light scattered once.
     pub single_scattering: SingleScattering,
     /// Where the numbers came from: "preset skin1", "extras.bssrdf", "KHR_materials_scatter", ...

@@ -81,6 +81,7 @@ impl Authored {
             g: self.g,
             appearance: None,
             model: None,
+            directional: None,
             single_scattering: SingleScattering::Auto,
             source: source.into(),
         }

@@ -24,7 +24,7 @@ fn data_uri(bytes: &[u8]) -> String {
 }
 
 /// Adds a picture with a sampler; the index of its texture.
-fn add_texture(file: &mut Value, picture: &RgbaImage, sampler: Value) -> usize {
+pub fn add_texture(file: &mut Value, picture: &RgbaImage, sampler: Value) -> usize {
     let mut bytes = std::io::Cursor::new(vec![]);
     picture.write_to(&mut bytes, ImageFormat::Png).expect("a picture in memory");
     let mut push = |list: &str, item: Value| {
@@ -41,7 +41,7 @@ fn add_texture(file: &mut Value, picture: &RgbaImage, sampler: Value) -> usize {
 }
 
 /// Gives the vertices of a mesh texture coordinates.
-fn add_coordinates(file: &mut Value, mesh: usize, uv: impl Iterator<Item = DVec2>) {
+pub fn add_coordinates(file: &mut Value, mesh: usize, uv: impl Iterator<Item = DVec2>) {
     let uv: Vec<[f32; 2]> = uv.map(|uv| uv.as_vec2().to_array()).collect();
     let bytes: &[u8] = bytemuck::cast_slice(&uv);
     let mut push = |list: &str, item: Value| {
@@ -57,7 +57,7 @@ fn add_coordinates(file: &mut Value, mesh: usize, uv: impl Iterator<Item = DVec2
 }
 
 /// A picture whose texels are numbers of a hash, none of them below `least`.
-fn noise(size: u32, least: u8) -> RgbaImage {
+pub fn noise(size: u32, least: u8) -> RgbaImage {
     let byte = |i: u32| least + (translucent::reference::random::hash(i) % (256 - u32::from(least))) as u8;
     RgbaImage::from_fn(size, size, |x, y| {
         let i = 4 * (size * y + x);

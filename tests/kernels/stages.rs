@@ -100,7 +100,7 @@ fn cases() -> Vec<(String, Case)> {
             scene.set_environment(environment.clone()).expect("the environment is valid");
             scene.lights.truncate(1);
         }
-        let directional = Directional { reciprocal: projection == Projection::Mis, ..Directional::default() };
+        let directional = Some(Directional { reciprocal: projection == Projection::Mis, ..Directional::default() });
         let settings = Settings {
             resolution: Some(FULL),
             crop: Some(CROP),

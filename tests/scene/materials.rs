@@ -3,8 +3,8 @@
 use crate::build::*;
 use glam::DVec3;
 use serde_json::{Value, json};
-use translucent::Model;
 use translucent::scene::{LoadOptions, Material, Medium};
+use translucent::{Model, settings::Directional};
 
 /// Total diffuse reflectance of the standard dipole (Jensen & Buhler 2002), with the Fresnel moment in closed form
 /// (Walsh; n > 1).
@@ -321,6 +321,13 @@ fn warnings_name_what_is_left_out() {
     let model = |name: &str| json!({"extras": {"bssrdf": {"preset": "skin1", "model": name}}});
     assert_eq!(warnings(model("standard")), Vec::<String>::new());
     assert_eq!(medium(model("burley")).model, Some(Model::Burley));
+    assert_eq!(medium(model("lambert")).model, Some(Model::Lambert));
+    let mut options = model("directional");
+    assert_eq!(medium(options.clone()).directional, None);
+    options["extras"]["bssrdf"]["kappa"] = json!(0.5);
+    options["extras"]["bssrdf"]["reciprocal"] = json!(true);
+    let expected = Directional { reciprocal: true, kappa: 0.5, ..Directional::default() };
+    assert_eq!(medium(options).directional, Some(expected));
 }
 
 #[test]

@@ -25,6 +25,8 @@
 //! mean free path and normal maps turn into fireflies. Here d_r^2 >= r^2 + (kappa / (3 sigma_t))^2 in front too. kappa = 1
 //! makes d_r continuous and leaves smooth surfaces as they are, where D mu_0 (...) is larger; 0 is the published model. It
 //! takes light away near r = 0 where the refracted beam is within kappa (1 - g) or so of the exit's tangent plane.
+//! Under grazing light on noisy normal maps, and beside the edges of boxes, the published model's brightest pixel has 20 to
+//! 270 times the median at 64 samples; with kappa = 1 it has 3 to 9 times, which is the picture's contrast.
 //!
 //! # What it lacks
 //! It conserves no energy: under diffuse light the total exceeds 1 at high albedos, by 10 to 25 percent. `renormalise`
