@@ -62,7 +62,7 @@ pub struct Prepared {
 impl Prepared {
     /// What a user should know of the models that were chosen.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        self.advice.iter().flatten().filter_map(|advice| advice.warning.clone())
+        self.advice.iter().flatten().flat_map(|advice| advice.warnings.clone())
     }
 
     /// The buffers as the twins read them.
@@ -475,6 +475,9 @@ fn spheres(thickness: &[Vec3], channels: &[Coefficients; 3]) -> Vec<i32> {
     let all = || thickness.iter().flat_map(|c| c.to_array()).filter(|&c| c > 0.0).map(f64::from);
     let (Some(least), Some(most)) = (all().reduce(f64::min), all().reduce(f64::max)) else { return vec![] };
     let longest = channels.iter().filter(|c| c.sigma_s_prime > 0.0).map(|c| 1.0 / c.sigma_s_prime).fold(0.0, f64::max);
+    if longest == 0.0 {
+        return vec![];
+    }
     let number = |radius: f64| 2.0 * (2.0 * radius).log2();
     let last = number((1.0 / least).min(128.0 * longest)).ceil() as i32;
     let first = number(1.0 / most).floor() as i32;

@@ -59,6 +59,21 @@ pub fn of(model: Model, albedo: f64, ior: f64) -> Option<Error> {
     Some(Error { total: mix(|error| error.total), l1: mix(|error| error.l1) })
 }
 
+/// Least and largest error of the total on balls of the radius 1 and on plates of the thickness 1 mean free path, over the
+/// media of [`model_errors`](crate::model_errors); none for the opaque limit. `curvature` as in
+/// [`Settings`](crate::Settings).
+pub fn on_thin_bodies(model: Model, curvature: bool) -> Option<[(f64, f64); 2]> {
+    match model {
+        Model::Standard => Some([(-0.67, -0.64), (0.01, 0.64)]),
+        Model::Better => Some([(-0.80, -0.72), (-0.24, 0.67)]),
+        Model::Directional => Some([(-0.28, 0.12), (1.03, 1.14)]),
+        Model::Burley => Some([(-0.63, -0.61), (-0.12, 0.70)]),
+        Model::Table if curvature => Some([(0.20, 0.33), (1.02, 1.46)]),
+        Model::Table => Some([(-0.68, -0.62), (-0.15, 0.62)]),
+        Model::Auto | Model::Lambert => None,
+    }
+}
+
 /// The interval of an ascending grid that holds x, and where in it x is, 0 to 1; the nearest end for an x outside.
 fn place<const N: usize>(grid: [f64; N], x: f64) -> (usize, f64) {
     let index = grid.partition_point(|start| *start <= x).clamp(1, N - 1) - 1;

@@ -38,6 +38,9 @@ const UNSEEN: f64 = 1.0 / 512.0;
 /// Errors from which on a model's choice brings a warning: of the total, and of place or amount.
 const WARNED: Error = Error { total: 0.1, l1: 0.5 };
 
+/// Mean free paths below which a body is thin.
+const THIN: f64 = 3.0;
+
 /// A model that was chosen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
@@ -57,8 +60,8 @@ pub struct Advice {
     pub recommended: Choice,
     /// Error of the chosen model on a plane, of the channel where it is largest; none where it is not known.
     pub error: Option<Error>,
-    /// Where that is too much to go unsaid.
-    pub warning: Option<String>,
+    /// Where that is too much to go unsaid, and where a body is too thin for the model.
+    pub warnings: Vec<String>,
 }
 
 /// The model of a material that shows this much of it; none for an opaque one.
@@ -80,13 +83,24 @@ pub fn advise(settings: &Settings, material: &Material, detail: Detail) -> Optio
         Model::Lambert => Error { l1: 2.0 + error.total, ..error },
         _ => error,
     });
-    let warning = error.filter(|error| error.l1 > WARNED.l1 || error.total.abs() > WARNED.total).map(|error| {
-        let (name, model) = (&material.name, choice.model);
+    let (name, model) = (&material.name, choice.model);
+    let wrong = error.filter(|error| error.l1 > WARNED.l1 || error.total.abs() > WARNED.total).map(|error| {
         let advice =
             if recommended.model == model { String::new() } else { format!("; {} errs less", recommended.model) };
         format!("{name}: a plane with the {model} model {error}{advice}")
     });
-    Some(Advice { choice, recommended, error, warning })
+    let thin = thin(&channels, detail).zip(errors::on_thin_bodies(model, settings.curvature));
+    let thin = thin.map(|(paths, [balls, plates])| {
+        let range = |(least, most): (f64, f64)| format!("{:+.0} to {:+.0} %", 100.0 * least, 100.0 * most);
+        format!(
+            "{name}: its bodies are {paths:.1} mean free paths thick; on those of one, the {model} model's light is off by {} \
+             (balls) and {} (plates)",
+            range(balls),
+            range(plates)
+        )
+    });
+    let warnings = wrong.into_iter().chain(thin).collect();
+    Some(Advice { choice, recommended, error, warnings })
 }
 
 /// What `auto` means for matter that shows this much.
@@ -126,6 +140,13 @@ fn recommend(channels: &[Coefficients], detail: Detail) -> Choice {
 /// Whether nothing shows of light that travels this far (m) on average.
 fn hidden(distance: f64, detail: Detail) -> bool {
     distance < UNSEEN * PI * detail.pixel.min(detail.thickness)
+}
+
+/// Thickness in mean free paths of the channel that scatters with the longest one, where that is little.
+fn thin(channels: &[Coefficients], detail: Detail) -> Option<f64> {
+    let scattering = channels.iter().filter(|channel| channel.sigma_s_prime > 0.0);
+    let least = scattering.map(|channel| channel.sigma_s_prime + channel.sigma_a).reduce(f64::min)?;
+    Some(detail.thickness * least).filter(|&paths| paths < THIN)
 }
 
 /// The mean distance that light travels in the channel where it travels farthest.

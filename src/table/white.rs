@@ -426,10 +426,13 @@ impl Profile {
 
     /// Slope k of the total in the cosine mu' of refraction, total (1 + k (1 - mu')), from the total under diffuse light.
     ///
-    /// For the incidences that a boundary with n >= 1.3 leaves, mu' > .64, totals are linear in mu' within 1 %.
+    /// For the incidences that a boundary with n >= 1.3 leaves, mu' > .64, totals are linear in mu' within 1 %. Beyond the
+    /// tabulated albedos and radii the two totals are not of the same matter, and it is 0.
     pub fn slope(&self) -> f64 {
-        let diffuse: f64 = self.parts.iter().map(|part| part.weight * part.diffuse).sum::<f64>()
-            / self.parts.iter().map(|part| part.weight).sum::<f64>();
+        if self.parts.iter().map(|part| part.weight).sum::<f64>() < 1.0 - 1e-9 {
+            return 0.0;
+        }
+        let diffuse: f64 = self.parts.iter().map(|part| part.weight * part.diffuse).sum();
         (diffuse / self.total().mean - 1.0) / mean_obliqueness(self.matter.ior)
     }
 }

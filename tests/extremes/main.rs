@@ -29,6 +29,12 @@ const ROWS: &[(&str, &str, &str, &str)] = &[
         "extremes/matter.rs::every_matter_has_its_radiance",
     ),
     (
+        "the same under the table and what auto takes, n 1, 1.3, 1.5",
+        "a table left or never entered, a choice without a model",
+        "finite, no more light than came but for the table's known error",
+        "extremes/matter.rs::tables_and_what_auto_takes_of_every_matter_are_finite",
+    ),
+    (
         "n = 1 -+ 1e-6",
         "fits give a Fresnel boundary that is not there",
         "the image is that of n = 1 to 1e-4",

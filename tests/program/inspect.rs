@@ -85,6 +85,15 @@ fn models_beyond_their_validity_bring_a_warning_with_the_expected_error() {
             assert!(!said(model).contains("a plane with the"), "{words}, {model}");
         }
     }
+    // An animal of 1.3 mm is no longer than a mean free path, one of 13 cm is a hundred.
+    let thin = folder.run(&format!("render {small} --samples 1"));
+    assert!(
+        stderr(&thin).contains("wax: its bodies are 0.") && stderr(&thin).contains("(plates)"),
+        "{}",
+        stderr(&thin)
+    );
+    let thick = folder.done("inspect SPOT --material wax=skin1 --resolution 8x8");
+    assert!(!thick.contains("mean free paths thick"), "{thick}");
     let quiet = folder.run(&format!("render {small} --samples 1 --model directional --quiet"));
     assert_eq!(stderr(&quiet), "");
 }
