@@ -11,7 +11,7 @@ use translucent::{
         boundary::{Side, diffuse_reflectance, transmittance},
         profile::{Dipole, Radial},
     },
-    scene::Environment,
+    scene::{Environment, Lens},
 };
 
 /// Half the side of the slab and its thickness [m], for a mean free path of 1 m: edges and back are beyond the ball.
@@ -107,24 +107,31 @@ fn sphere_in_uniform_light_is_flat() {
     // How far a triangle's middle lies below the true sphere: at cosine c that moves the cosine by up to depth / c.
     let middle = |t: &[u32]| t.iter().map(|i| mesh.positions[*i as usize]).sum::<DVec3>().length() / 3.0;
     let depth = 1.0 - mesh.indices.chunks_exact(3).map(middle).fold(1.0, f64::min);
+    let eye = Eye { eye: DVec3::Z, at: DVec3::ZERO, lens: 1.0 };
+    let mut scene = scene(&gltf(&[(mesh, 0)], &[matter([1.0; 3], [1.0; 3], 1.3)], &[], &eye));
+    scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
     for (distance, lens) in [(3.0, 0.75), (50.0, 0.042), (10.0, -1.05)] {
+        scene.cameras[0].eye = DVec3::Z * distance;
+        scene.cameras[0].lens = match lens > 0.0 {
+            true => Lens::Perspective { yfov: lens, aspect: None },
+            false => Lens::Orthographic { xmag: -lens, ymag: -lens },
+        };
         for sigma_tr_radius in [0.5, 5.0, 30.0] {
             // alpha' = .95 has sigma_tr = sigma_t' sqrt(.15).
             let sigma_t = sigma_tr_radius / 0.15f64.sqrt();
             let dipole = Dipole::new(0.95 * sigma_t, 0.05 * sigma_t, 1.3);
-            let materials = [matter([0.95 * sigma_t; 3], [0.05 * sigma_t; 3], 1.3)];
-            let eye = Eye { eye: DVec3::new(0.0, 0.0, distance), at: DVec3::ZERO, lens };
-            let mut scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, &[], &eye));
-            scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
+            let medium = scene.materials[0].medium.as_mut().expect("the matter scatters");
+            medium.sigma_s_prime = DVec3::splat(0.95 * sigma_t);
+            medium.sigma_a = DVec3::splat(0.05 * sigma_t);
             let image = render(&scene, &Settings { resolution: Some((48, 48)), seed: 5, ..standard() }, 64);
             let expected = dipole.cdf(2.0 * radius);
             // Cosine at which a ray through column x and row y meets the true sphere; not a number where it does not.
             let cosine = |x: f64, y: f64| {
                 let ndc = DVec3::new(x / 24.0 - 1.0, 1.0 - y / 24.0, 0.0);
                 let (origin, direction) = if lens > 0.0 {
-                    (eye.eye, (ndc * (lens / 2.0).tan() - DVec3::Z).normalize())
+                    (DVec3::Z * distance, (ndc * (lens / 2.0).tan() - DVec3::Z).normalize())
                 } else {
-                    (eye.eye - ndc * lens, -DVec3::Z)
+                    (DVec3::Z * distance - ndc * lens, -DVec3::Z)
                 };
                 (1.0 - origin.cross(direction).length_squared()).sqrt()
             };
@@ -176,10 +183,13 @@ fn sphere_emits_what_enters_it() {
     let light = (sun(), DVec3::new(3.0, 4.0, 5.0), DVec3::ZERO);
     let (mut flux, mut variance) = (0.0, 0.0);
     let resolution = 120;
+    let eye = Eye { eye: DVec3::Z, at: DVec3::ZERO, lens: -1.05 };
+    let mut scene = scene(&gltf(&[(mesh, 0)], &materials, &[light], &eye));
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         for direction in [axis, -axis] {
-            let eye = Eye { eye: direction * 10.0, at: DVec3::ZERO, lens: -1.05 };
-            let scene = scene(&gltf(&[(mesh.clone(), 0)], &materials, std::slice::from_ref(&light), &eye));
+            let camera = &mut scene.cameras[0];
+            (camera.eye, camera.forward) = (direction * 10.0, -direction);
+            (camera.up, camera.right) = camera.forward.any_orthonormal_pair();
             let settings = Settings { resolution: Some((resolution, resolution)), seed: 9, ..standard() };
             let image = render(&scene, &settings, 16);
             let pixel_area = (2.1 / f64::from(resolution)).powi(2);

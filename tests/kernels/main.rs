@@ -18,9 +18,10 @@ mod stages;
 mod steps;
 mod sweep;
 mod textures;
+mod watertight;
 
 use bytemuck::Pod;
-use glam::UVec4;
+use glam::{UVec4, Vec3};
 use std::{
     collections::HashMap,
     sync::{Mutex, MutexGuard, OnceLock},
@@ -31,7 +32,7 @@ use translucent::{
     prepare::{Prepared, prepare},
     reference::Inputs,
     render::SPIRV,
-    shared::{Features, Slot, Step},
+    shared::{Features, Slot, Step, glsl},
 };
 
 /// The device that all tests share, one test at a time, and the kernels made on it.
@@ -88,12 +89,6 @@ impl Bench {
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
         let bindings = Bindings::new(&self.layout, &bound).expect("bindings");
         Loaded { features: inputs.features, bindings, buffers }
-    }
-
-    /// Adds a kernel that only tests have.
-    pub fn add(&mut self, stem: &'static str, spirv: &[u8], features: &Features) {
-        let kernel = Kernel::new(&self.layout, stem, spirv, features, 64).expect("kernel");
-        self.kernels.insert((stem, *features), kernel);
     }
 
     /// Runs one kernel once.
@@ -175,6 +170,45 @@ pub fn run(stem: &'static str, inputs: &Inputs, nodes: &[UVec4], step: &Step, bu
     bench.dispatch(stem, &loaded, step);
     bench.check();
     Outputs(loaded)
+}
+
+/// Runs a kernel that only a test has over `numbers` in BatchSums and returns what it leaves there. `source` is its GLSL,
+/// `function` the `step_.ray_begin` by which it may tell what to compute.
+pub fn evaluate(
+    stem: &'static str,
+    source: &str,
+    inputs: &Inputs,
+    nodes: &[UVec4],
+    function: u32,
+    numbers: &[Vec3],
+) -> Vec<Vec3> {
+    let mut bench = bench();
+    let Bench { layout, kernels, .. } = &mut *bench;
+    let make = || Kernel::new(layout, stem, &compile(source), &inputs.features, 64).expect("kernel");
+    kernels.entry((stem, inputs.features)).or_insert_with(make);
+    let loaded = bench.load(inputs, nodes, &[(Slot::BatchSums, bytemuck::cast_slice(numbers))]);
+    let step = Step { pixel_count: numbers.len() as u32, ray_begin: function, ..Step::default() };
+    bench.dispatch(stem, &loaded, &step);
+    bench.check();
+    bench.read(&loaded, Slot::BatchSums)
+}
+
+/// SPIR-V of GLSL that may include what kernels do.
+fn compile(source: &str) -> Vec<u8> {
+    let compiler = shaderc::Compiler::new().expect("shaderc starts");
+    let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+    options.set_include_callback(|name, _, _, _| {
+        let content = match name {
+            "shared.glsl" => glsl(),
+            _ => std::fs::read_to_string(format!("{}/glsl/{name}", env!("CARGO_MANIFEST_DIR")))
+                .map_err(|error| error.to_string())?,
+        };
+        Ok(shaderc::ResolvedInclude { resolved_name: name.into(), content })
+    });
+    let compiled =
+        compiler.compile_into_spirv(source.trim_start(), shaderc::ShaderKind::Compute, "test", "main", Some(&options));
+    compiled.expect("the kernel compiles").as_binary_u8().to_vec()
 }
 
 /// Asserts that the relative `errors` of all items are within 1e-5 but for one in a thousand, and that none is not a number.

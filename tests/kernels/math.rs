@@ -1,14 +1,8 @@
 //! The elementary functions of `math.glsl` against f64, over all that kernels ask of them.
 
-use crate::bench;
+use crate::common::World;
 use glam::Vec3;
-use translucent::{
-    reference::{
-        Inputs,
-        random::{hash, unit},
-    },
-    shared::{self, Features, Slot, Step, View},
-};
+use translucent::reference::random::{hash, unit};
 
 /// Bound on the errors of every function here.
 const BOUND: f64 = 1.0 / (1 << 21) as f64;
@@ -34,54 +28,9 @@ void main() {
 }
 "#;
 
-/// SPIR-V of a kernel that only a test has.
-pub fn compile(source: &str) -> Vec<u8> {
-    let compiler = shaderc::Compiler::new().expect("shaderc starts");
-    let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
-    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-    options.set_include_callback(|name, _, _, _| {
-        let content = match name {
-            "shared.glsl" => shared::glsl(),
-            _ => std::fs::read_to_string(format!("{}/glsl/{name}", env!("CARGO_MANIFEST_DIR")))
-                .map_err(|error| error.to_string())?,
-        };
-        Ok(shaderc::ResolvedInclude { resolved_name: name.into(), content })
-    });
-    let compiled =
-        compiler.compile_into_spirv(source.trim_start(), shaderc::ShaderKind::Compute, "test", "main", Some(&options));
-    compiled.expect("the kernel compiles").as_binary_u8().to_vec()
-}
-
 /// The function's values at `x`, on the device.
 fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
-    let view = View::default();
-    let inputs = Inputs {
-        features: Features::default(),
-        view: &view,
-        triangles: &[],
-        shadings: &[],
-        materials: &[],
-        lights: &[],
-        emitters: &[],
-        emitter_cdf: &[],
-        boundaries: &[],
-        environment: &[],
-        environment_cdf: &[],
-        texels: &[],
-        textures: &[],
-        coordinates: &[],
-        profiles: &[],
-        thickness: &[],
-        balances: &[],
-        mixtures: &[],
-    };
-    let mut bench = bench();
-    bench.add("math", &compile(KERNEL), &inputs.features);
-    let loaded = bench.load(&inputs, &[], &[(Slot::BatchSums, bytemuck::cast_slice(x))]);
-    let step = Step { pixel_count: x.len() as u32, ray_begin: function, ..Step::default() };
-    bench.dispatch("math", &loaded, &step);
-    bench.check();
-    bench.read(&loaded, Slot::BatchSums)
+    crate::evaluate("math", KERNEL, &World::default().inputs(), &[], function, x)
 }
 
 /// 2^16 numbers in [0, 1), the k-th kind of them.

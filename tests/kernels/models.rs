@@ -1,14 +1,13 @@
 //! Every model's functions on the device against their twins, over random matter of all magnitudes: 2^20 sets of matter,
 //! radius and directions for each, none of which may give what is not finite or negative.
 
-use crate::{bench, common::*, math::compile};
+use crate::{common::*, evaluate};
 use glam::{DVec3, Vec3, dvec3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use translucent::{
     Normalisation,
     reference::{
-        Inputs,
         profile::{Coefficients, Directional, Matter, Options, Profile, draw_radius, material, shapes_shifted},
         random::{hash, unit},
     },
@@ -70,10 +69,10 @@ fn random_material(model: u32, i: u32) -> Material {
 }
 
 struct Sweep {
-    materials: Vec<Material>,
+    /// Materials, and directions in the place of normals.
+    world: World,
     /// Radius in one channel's mean free paths, and two numbers in [0, 1).
     arguments: Vec<Vec3>,
-    directions: Vec<Shading>,
 }
 
 impl Sweep {
@@ -88,47 +87,23 @@ impl Sweep {
         };
         let arguments = (0..MATERIALS * EACH).into_par_iter().map(argument).collect();
         let directions = (0..MATERIALS * EACH).into_par_iter().map(directions).collect();
-        Sweep { materials, arguments, directions }
+        Sweep::of(materials, arguments, directions)
+    }
+
+    fn of(materials: Vec<Material>, arguments: Vec<Vec3>, shadings: Vec<Shading>) -> Sweep {
+        // The kernel of a scene with all models asks each material.
+        let models = 1 << MODEL_STANDARD | 1 << MODEL_BETTER | 1 << MODEL_DIRECTIONAL | 1 << MODEL_BURLEY;
+        let features = Features { models, ..Features::default() };
+        Sweep { world: World { features, materials, shadings, ..World::default() }, arguments }
     }
 
     /// What the device gives for function `index` at `arguments`.
     fn evaluate(&self, index: u32, arguments: &[Vec3]) -> Vec<Vec3> {
-        let view = View::default();
-        let inputs = Inputs {
-            // The kernel of a scene with all models asks each material.
-            features: Features {
-                models: 1 << MODEL_STANDARD | 1 << MODEL_BETTER | 1 << MODEL_DIRECTIONAL | 1 << MODEL_BURLEY,
-                ..Features::default()
-            },
-            view: &view,
-            triangles: &[],
-            shadings: &self.directions,
-            materials: &self.materials,
-            lights: &[],
-            environment: &[],
-            environment_cdf: &[],
-            texels: &[],
-            textures: &[],
-            coordinates: &[],
-            profiles: &[],
-            emitters: &[],
-            emitter_cdf: &[],
-            boundaries: &[],
-            thickness: &[],
-            balances: &[],
-            mixtures: &[],
-        };
-        let mut bench = bench();
-        bench.add("models", &compile(KERNEL), &inputs.features);
-        let loaded = bench.load(&inputs, &[], &[(Slot::BatchSums, bytemuck::cast_slice(arguments))]);
-        let step = Step { pixel_count: arguments.len() as u32, ray_begin: index, ..Step::default() };
-        bench.dispatch("models", &loaded, &step);
-        bench.check();
-        bench.read(&loaded, Slot::BatchSums)
+        evaluate("models", KERNEL, &self.world.inputs(), &[], index, arguments)
     }
 
     fn material(&self, i: usize) -> &Material {
-        &self.materials[i / EACH as usize]
+        &self.world.materials[i / EACH as usize]
     }
 }
 
@@ -213,7 +188,7 @@ fn radii_at_all_magnitudes() {
 fn directional_dipole_at_all_magnitudes() {
     let mut sweep = Sweep::new(MODEL_DIRECTIONAL);
     // Towards anywhere, along the normal, or at the entry itself.
-    let places = sweep.arguments.iter().zip(&sweep.directions).enumerate().map(|(i, (x, directions))| {
+    let places = sweep.arguments.iter().zip(&sweep.world.shadings).enumerate().map(|(i, (x, directions))| {
         let u = |k: u32| number(i as u32, 300 + k);
         let away = match (u(0) * 10.0) as u32 {
             0 => directions.normal0,
@@ -227,7 +202,7 @@ fn directional_dipole_at_all_magnitudes() {
     assert_valid("directional", &found, &sweep);
     let errors = found.par_iter().enumerate().map(|(i, found)| {
         let (m, x) = (sweep.material(i), sweep.arguments[i].as_dvec3());
-        let d = &sweep.directions[i];
+        let d = &sweep.world.shadings[i];
         let [ni, wi, no]: [DVec3; 3] = [d.normal0, d.normal1, d.normal2].map(|v| v.as_dvec3());
         let channel = |c: usize| {
             let profile = Directional::unpack(Matter::from(m), c);
@@ -262,13 +237,13 @@ fn golden_values_on_the_device() {
         ((0.70, 0.009, 0.0, 1.3), dvec3(0.3, 0.2, -0.1), dvec3(0.6, 0.0, 0.8), tilted, 3.155625660e-2),
     ];
     let options = Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
-    let mut sweep = Sweep { materials: vec![], arguments: vec![], directions: vec![] };
+    let mut sweep = Sweep::of(vec![], vec![], vec![]);
     for (i, ((sigma_s, sigma_a, g, ior), x, wi, no, _)) in cases.into_iter().enumerate() {
         let matter =
             Coefficients { sigma_s_prime: sigma_s * (1.0 - g), sigma_a, g, ior, rough: None, appearance: None };
-        sweep.materials.push(material(MODEL_DIRECTIONAL, &[matter; 3], options));
+        sweep.world.materials.push(material(MODEL_DIRECTIONAL, &[matter; 3], options));
         sweep.arguments.push(x.as_vec3());
-        sweep.directions.push(Shading {
+        sweep.world.shadings.push(Shading {
             normal0: Vec3::Z,
             normal1: wi.as_vec3(),
             normal2: no.as_vec3(),
@@ -283,11 +258,11 @@ fn golden_values_on_the_device() {
     for model in [MODEL_STANDARD, MODEL_BETTER, MODEL_BURLEY] {
         let [matter, ..] = channels(DVec3::splat(2.62), DVec3::splat(0.0041), 1.5);
         let radii = [0.01f32, 0.1, 1.0, 5.0, 20.0];
-        let sweep = Sweep {
-            materials: vec![material(model, &[matter; 3], options)],
-            arguments: radii.iter().map(|&r| Vec3::splat(r)).collect(),
-            directions: vec![Shading::default(); radii.len()],
-        };
+        let sweep = Sweep::of(
+            vec![material(model, &[matter; 3], options)],
+            radii.iter().map(|&r| Vec3::splat(r)).collect(),
+            vec![Shading::default(); radii.len()],
+        );
         let profile = Profile::new(model, &matter);
         for (r, found) in radii.iter().zip(sweep.evaluate(0, &sweep.arguments)) {
             let expected = profile.shape(f64::from(*r));

@@ -1,9 +1,9 @@
 //! Texture lookup on the device against its twin: every wrap, filter, encoding and transform.
 
-use crate::{bench, math::compile};
+use crate::{common::World, evaluate};
 use glam::{DVec2, Vec3};
 use translucent::{
-    reference::{Inputs, random::hash, texture},
+    reference::{random::hash, texture},
     shared::*,
 };
 
@@ -48,47 +48,19 @@ fn lookup_is_the_twins() {
             });
         }
     }
-    let view = View::default();
-    let inputs = Inputs {
-        features: Features { textures: 1, ..Features::default() },
-        view: &view,
-        texels: &texels,
-        textures: &textures,
-        triangles: &[],
-        shadings: &[],
-        materials: &[],
-        lights: &[],
-        emitters: &[],
-        boundaries: &[],
-        emitter_cdf: &[],
-        environment: &[],
-        environment_cdf: &[],
-        coordinates: &[],
-        profiles: &[],
-        thickness: &[],
-        balances: &[],
-        mixtures: &[],
-    };
+    let features = Features { textures: 1, ..Features::default() };
+    let world = World { features, texels, textures, ..World::default() };
     let points: Vec<Vec3> = (0..1u32 << 14)
         .map(|i| {
             let u = |j: u32| (4.0 * number(3 * i + j) - 2.0) as f32;
-            Vec3::new(u(0), u(1), (i as usize % textures.len()) as f32)
+            Vec3::new(u(0), u(1), (i as usize % world.textures.len()) as f32)
         })
         .collect();
-    let mut bench = bench();
-    bench.add("texture", &compile(KERNEL), &inputs.features);
-    let mut found = vec![];
-    for part in 0..2 {
-        let loaded = bench.load(&inputs, &[], &[(Slot::BatchSums, bytemuck::cast_slice(&points))]);
-        let step = Step { pixel_count: points.len() as u32, ray_begin: part, ..Step::default() };
-        bench.dispatch("texture", &loaded, &step);
-        bench.check();
-        found.push(bench.read::<Vec3>(&loaded, Slot::BatchSums));
-    }
+    let found = [0, 1].map(|part| evaluate("texture", KERNEL, &world.inputs(), &[], part, &points));
     let mut outside = 0;
     for (i, point) in points.iter().enumerate() {
-        let texture = &textures[point.z as usize];
-        let twin = texture::at(&inputs, texture, DVec2::new(point.x.into(), point.y.into()));
+        let texture = &world.textures[point.z as usize];
+        let twin = texture::at(&world.inputs(), texture, DVec2::new(point.x.into(), point.y.into()));
         let color = (found[0][i].as_dvec3() - twin.truncate()).abs().max_element();
         let error = color.max((f64::from(found[1][i].x) - twin.w).abs());
         // A coordinate of up to 10 has an error of 1e-6, of up to 32 texels; the nearest texel may flip at its edge.
