@@ -19,10 +19,11 @@ PROBES(readonly);
 HIT_LISTS(readonly);
 #include "mixture.glsl"
 
-// Weights of the second and third vertex at a point of a triangle, from its corner.
-vec2 weights(Triangle triangle, vec3 from_corner) {
-    vec3 n = cross(triangle.edge1, triangle.edge2);
-    return vec2(dot(cross(from_corner, triangle.edge2), n), dot(cross(triangle.edge1, from_corner), n)) / dot(n, n);
+// Weights of the second and third vertex at a point of a triangle, relative to its first.
+vec2 weights(Triangle triangle, vec3 point) {
+    vec3 edge1 = triangle.vertices[1] - triangle.vertices[0], edge2 = triangle.vertices[2] - triangle.vertices[0];
+    vec3 n = cross(edge1, edge2);
+    return vec2(dot(cross(point, edge2), n), dot(cross(edge1, point), n)) / dot(n, n);
 }
 
 // The matter that light enters at a point of a triangle; `m` is that of the surface that is seen.
@@ -115,7 +116,7 @@ void main() {
             vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
             uint triangle = hit_lists[index].triangle[j];
             vec3 n = geometric_normal(triangles[triangle]);
-            vec3 from_corner = (s.position - triangles[triangle].corner) + delta;
+            vec3 from_corner = (s.position - triangles[triangle].vertices[0]) + delta;
             float p = PROJECTION == PROJECTION_CAMERA ? 1.0 : hit_density(s, m, surface, delta, n);
             Material local = entered_matter(m, surface, triangle, weights(triangles[triangle], from_corner));
             vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift);
@@ -134,7 +135,7 @@ void main() {
 
         delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
         lit = hit_lists[index].triangle[chosen];
-        barycentric = weights(triangles[lit], (s.position - triangles[lit].corner) + delta);
+        barycentric = weights(triangles[lit], (s.position - triangles[lit].vertices[0]) + delta);
         local = entered_matter(m, surface, lit, barycentric);
         own_value = has_model(local, MODEL_DIRECTIONAL);
         float given = PROJECTION == PROJECTION_CAMERA

@@ -7,7 +7,7 @@ EMITTER_CDF(readonly);
 // Radiance that a triangle sends against the unit vector `direction`, at the weights of its second and third vertex.
 vec3 emitted(uint triangle, vec2 barycentric, vec3 direction) {
     Material m = materials[shadings[triangle].material];
-    bool back = dot(cross(triangles[triangle].edge1, triangles[triangle].edge2), direction) > 0.0;
+    bool back = dot(geometric_normal(triangles[triangle]), direction) > 0.0;
     if (back && (m.flags & TWO_SIDED) == 0 || !solid(triangle, barycentric)) return vec3(0.0);
     if (has_texture(TEXTURE_EMISSION)) m.emission *= texture_value(TEXTURE_EMISSION, triangle, barycentric).rgb;
     return m.emission;
@@ -28,7 +28,7 @@ float emitter_density(View view, uint triangle) {
 
 // Radiance over the sum of two densities per solid angle: `directional`, and `density` per area at this distance.
 vec3 combined(vec3 radiance, float density, float distance, uint triangle, vec3 direction, float directional) {
-    float c = abs(dot(normalize(cross(triangles[triangle].edge1, triangles[triangle].edge2)), direction));
+    float c = abs(dot(geometric_normal(triangles[triangle]), direction));
     float sum = density * distance * distance + c * directional;
     return sum > 0.0 ? radiance * (c / sum) : vec3(0.0);
 }
@@ -59,7 +59,7 @@ EmitterPoint draw_emitter(View view, vec3 base, vec3 offset, vec2 u) {
     float s = sqrt(rest);
     point.barycentric = vec2(s - s * u.y, s * u.y);
     Triangle triangle = triangles[point.triangle];
-    vec3 to = ((triangle.corner - base) - offset) + point.barycentric.x * triangle.edge1 + point.barycentric.y * triangle.edge2;
+    vec3 to = ((triangle.vertices[0] - base) - offset) + from_corner(triangle, point.barycentric);
     point.distance = length(to);
     point.direction = to / point.distance;
     return point;

@@ -19,12 +19,37 @@ const uint CLOSEST = 0;
 const uint ANY = 1;
 const uint ALL = 2;
 const uint EVERY_SET = 0xffffffffu;
+// What stands for the area of a ray through an edge.
+const float EDGE = 1e-36;
 
 // The result: CLOSEST and ANY set the first entry.
 uint hit_count;
 float hit_t[MAX_HITS];
 uint hit_triangle[MAX_HITS];
 vec2 hit_barycentric;
+
+// From a triangle's first vertex to a point of it.
+vec3 from_corner(Triangle t, vec2 barycentric) {
+    return barycentric.x * (t.vertices[1] - t.vertices[0]) + barycentric.y * (t.vertices[2] - t.vertices[0]);
+}
+
+// Turns the axis along which a ray runs most to z.
+vec3 turned(vec3 v, uint axis) {
+    return axis == 0u ? v.yzx : (axis == 1u ? v.zxy : v);
+}
+
+// Where a point is seen along the ray, which is in the origin.
+vec2 along(Ray ray, vec2 slope, uint axis, vec3 point) {
+    precise vec3 to = turned((point - ray.base) - ray.offset, axis);
+    precise vec2 seen = to.xy - slope * to.z;
+    return seen;
+}
+
+// Twice the area of (0, a, b), whose sign says on which side of an edge the ray passes; see src/reference/intersect.rs.
+float side_of_edge(vec2 a, vec2 b) {
+    precise float area = a.x * b.y - a.y * b.x;
+    return area != 0.0 ? area : (a.y < b.y || a.y == b.y && a.x < b.x ? EDGE : -EDGE);
+}
 
 // Bytes of a word as floats.
 vec4 unpack_bytes(uint w) {
@@ -64,9 +89,13 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
     bvec3 negative = lessThan(d, vec3(0.0));
     uint oct_inv4 = (negative.x ? 0u : 0x04040404u) | (negative.y ? 0u : 0x02020202u) | (negative.z ? 0u : 0x01010101u);
     vec3 origin = ray.base + ray.offset;
-    // Boxes grow by a few roundings of the origin, so that none is missed.
+    // Boxes grow by a few roundings of the origin, and of their own planes, so that none is missed.
     vec3 slack = abs(inv) * 4.76837158203125e-7 * (1.0 + max(abs(origin.x), max(abs(origin.y), abs(origin.z))));
     float t_max = ray.t_max;
+    vec3 slope = abs(ray.direction);
+    uint axis = slope.x >= max(slope.y, slope.z) ? 0u : (slope.y >= slope.z ? 1u : 2u);
+    slope = turned(ray.direction, axis);
+    slope.xy /= slope.z;
 
     uvec2 stack[BVH_DEPTH];
     uint stack_size = 0;
@@ -89,10 +118,11 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
                 uintBitsToFloat(((a.w >> 16) & 255u) << 23));
             vec3 scale = extent * inv;
             vec3 start = ((uintBitsToFloat(a.xyz) - ray.base) - ray.offset) * inv;
-            uint mask = children_met(b.z, oct_inv4, x.x, x.z, y.x, y.z, z.x, z.z, negative, scale, start - slack,
-                start + slack, ray.t_min, t_max);
-            mask |= children_met(b.w, oct_inv4, x.y, x.w, y.y, y.w, z.y, z.w, negative, scale, start - slack,
-                start + slack, ray.t_min, t_max);
+            vec3 rounding = slack + 2.384185791015625e-7 * (abs(start) + 256.0 * abs(scale));
+            uint mask = children_met(b.z, oct_inv4, x.x, x.z, y.x, y.z, z.x, z.z, negative, scale, start - rounding,
+                start + rounding, ray.t_min, t_max);
+            mask |= children_met(b.w, oct_inv4, x.y, x.w, y.y, y.w, z.y, z.w, negative, scale, start - rounding,
+                start + rounding, ray.t_min, t_max);
             nodes_left = uvec2(b.x, (mask & 0xff000000u) | (a.w >> 24));
             triangles_left = uvec2(b.y, mask & 0x00ffffffu);
         }
@@ -102,17 +132,18 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
             triangles_left.y &= triangles_left.y - 1u;
             uint index = triangles_left.x + bit;
             Triangle triangle = triangles[index];
-            // Moeller and Trumbore 1997.
-            vec3 p = cross(ray.direction, triangle.edge2);
-            float determinant = dot(triangle.edge1, p);
-            float inv_determinant = 1.0 / determinant;
-            vec3 s = (ray.base - triangle.corner) + ray.offset;
-            float u = dot(s, p) * inv_determinant;
-            vec3 q = cross(s, triangle.edge1);
-            float v = dot(ray.direction, q) * inv_determinant;
-            float t = dot(triangle.edge2, q) * inv_determinant;
-            bool hit = determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= ray.t_min && t <= t_max;
-            if (has_texture(TEXTURE_ALPHA)) hit = hit && solid(index, vec2(u, v));
+            // Woop, Benthin, Wald 2013.
+            vec2 a = along(ray, slope.xy, axis, triangle.vertices[0]);
+            vec2 b = along(ray, slope.xy, axis, triangle.vertices[1]);
+            vec2 c = along(ray, slope.xy, axis, triangle.vertices[2]);
+            vec3 area = vec3(side_of_edge(b, c), side_of_edge(c, a), side_of_edge(a, b));
+            vec2 barycentric = area.yz / (area.x + area.y + area.z);
+            vec3 normal = cross(triangle.vertices[1] - triangle.vertices[0], triangle.vertices[2] - triangle.vertices[0]);
+            float rate = dot(normal, ray.direction);
+            float t = dot(normal, (triangle.vertices[0] - ray.base) - ray.offset) / rate;
+            bool hit = (min(area.x, min(area.y, area.z)) > 0.0 || max(area.x, max(area.y, area.z)) < 0.0)
+                && rate != 0.0 && t >= ray.t_min && t <= t_max;
+            if (has_texture(TEXTURE_ALPHA)) hit = hit && solid(index, barycentric);
             if (set != EVERY_SET) hit = hit && triangle.set == set;
             if (mode == ALL) {
                 uint n = hit_count + 1u;
@@ -128,7 +159,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
                 hit_count = 1u;
                 hit_t[0] = t;
                 hit_triangle[0] = index;
-                hit_barycentric = vec2(u, v);
+                hit_barycentric = barycentric;
                 if (mode == ANY) break;
             }
         }

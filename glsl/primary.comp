@@ -35,7 +35,7 @@ void main() {
     surface.barycentric = vec2(0.0);
     if (hit_count != 0) {
         Triangle triangle = triangles[hit_triangle[0]];
-        surface.position = triangle.corner + (hit_barycentric.x * triangle.edge1 + hit_barycentric.y * triangle.edge2);
+        surface.position = triangle.vertices[0] + from_corner(triangle, hit_barycentric);
         surface.triangle = hit_triangle[0];
         surface.barycentric = hit_barycentric;
     }

@@ -24,7 +24,7 @@ vec3 shading_normal(Shading s, uint triangle, vec2 barycentric) {
 }
 
 vec3 geometric_normal(Triangle t) {
-    return normalize(cross(t.edge1, t.edge2));
+    return normalize(cross(t.vertices[1] - t.vertices[0], t.vertices[2] - t.vertices[0]));
 }
 
 Seen seen(View view, Surface surface, Triangle triangle, Shading shading) {

@@ -66,7 +66,7 @@ void main() {
         Triangle triangle = triangles[surface.triangle];
         Seen s = seen(view, surface, triangle, shading);
         // Positions round as the vertices do, and opaque surfaces may reach far beyond the unit ball.
-        vec3 extent = max(abs(triangle.corner), max(abs(triangle.edge1), abs(triangle.edge2)));
+        vec3 extent = max(abs(triangle.vertices[0]), max(abs(triangle.vertices[1]), abs(triangle.vertices[2])));
         vec3 offset = s.normal * (SHADOW_OFFSET * max(1.0, max(extent.x, max(extent.y, extent.z))));
         bool translucent = (m.flags & TRANSLUCENT) != 0;
         float alpha = translucent ? m.alpha : max(m.alpha, OPAQUE_ALPHA_MIN);

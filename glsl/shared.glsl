@@ -259,11 +259,8 @@ struct Sample {
 
 // A triangle in the order of the BVH's leaves, for traversal.
 struct Triangle {
-    vec3 corner;
-    // From the corner to the second vertex.
-    vec3 edge1;
-    // From the corner to the third vertex; edge1 x edge2 points out of the matter.
-    vec3 edge2;
+    // Counter-clockwise as seen from outside the matter; triangles that share a vertex have its very bits.
+    vec3 vertices[3];
     // The set of surfaces that exchange light, to which it belongs.
     uint set;
 };

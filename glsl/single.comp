@@ -187,7 +187,7 @@ void main() {
                         part *= texture_value(TEXTURE_BASE_COLOR, found, hit_barycentric).rgb;
                     }
                 }
-                exit = triangle.corner + hit_barycentric.x * triangle.edge1 + hit_barycentric.y * triangle.edge2;
+                exit = triangle.vertices[0] + from_corner(triangle, hit_barycentric);
                 exit_offset = outward * SHADOW_OFFSET;
             }
         } else if (wanted) {

@@ -68,8 +68,7 @@ pub fn inverse_radii(triangles: &[Triangle], lengths: &[Option<f64>]) -> Vec<Vec
 
 /// The vertices of a triangle.
 pub fn corners(triangle: &Triangle) -> Corners {
-    let (corner, edge1, edge2) = (triangle.corner.as_dvec3(), triangle.edge1.as_dvec3(), triangle.edge2.as_dvec3());
-    [corner, corner + edge1, corner + edge2]
+    triangle.vertices.map(|vertex| vertex.as_dvec3())
 }
 
 /// 1 / a at the three vertices of each triangle of one body.

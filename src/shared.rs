@@ -9,7 +9,7 @@
 //! Rec.709.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{UVec4, Vec2, Vec3, Vec4};
+use glam::{DVec3, UVec4, Vec2, Vec3, Vec4};
 
 /// A type that has the same bytes in Rust (`repr(C)`) and in GLSL (`scalar` layout).
 pub trait Glsl {
@@ -410,11 +410,8 @@ structs! {
 
     /// A triangle in the order of the BVH's leaves, for traversal.
     struct Triangle {
-        corner: Vec3,
-        /// From the corner to the second vertex.
-        edge1: Vec3,
-        /// From the corner to the third vertex; edge1 x edge2 points out of the matter.
-        edge2: Vec3,
+        /// Counter-clockwise as seen from outside the matter; triangles that share a vertex have its very bits.
+        vertices: [Vec3; 3],
         /// The set of surfaces that exchange light, to which it belongs.
         set: u32,
     }
@@ -731,6 +728,14 @@ impl Features {
     /// The first of those rays that is a direction.
     pub fn first_direction(&self, view: &View) -> u32 {
         view.light_count + self.emitters * view.directions
+    }
+}
+
+impl Triangle {
+    /// The first vertex, and the edges from it to the second and third; their cross product points out of the matter.
+    pub fn corner_and_edges(&self) -> [DVec3; 3] {
+        let [a, b, c] = self.vertices.map(|vertex| vertex.as_dvec3());
+        [a, b - a, c - a]
     }
 }
 

@@ -25,10 +25,8 @@ impl Detail {
         let thicknesses = thicknesses(scene);
         let rows = f64::from(height);
         for (triangle, shading) in scene.triangles.iter().zip(&scene.shadings) {
-            let corner = triangle.corner.as_dvec3();
-            let corners = [corner, corner + triangle.edge1.as_dvec3(), corner + triangle.edge2.as_dvec3()];
             let depth = |p: DVec3| (p / scene.frame.scale + scene.frame.centre - camera.eye).dot(camera.forward);
-            let depths = corners.map(depth);
+            let depths = triangle.vertices.map(|vertex| depth(vertex.as_dvec3()));
             let nearest = depths.into_iter().fold(f64::INFINITY, f64::min).max(0.0);
             let detail = &mut details[shading.material as usize];
             if depths.iter().any(|&depth| depth > 0.0) {
@@ -54,9 +52,10 @@ impl Detail {
 fn thicknesses(scene: &Scene) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); scene.sets.len()];
     for triangle in &scene.triangles {
-        let normal = triangle.edge1.as_dvec3().cross(triangle.edge2.as_dvec3());
+        let [corner, edge1, edge2] = triangle.corner_and_edges();
+        let normal = edge1.cross(edge2);
         let (volume, area): &mut (f64, f64) = &mut sums[triangle.set as usize];
-        *volume += normal.dot(triangle.corner.as_dvec3()) / 6.0;
+        *volume += normal.dot(corner) / 6.0;
         *area += normal.length() / 2.0;
     }
     let of = |(set, (volume, area)): (&Set, (f64, f64))| match set.open_edges + set.crowded_edges {

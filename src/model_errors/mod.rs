@@ -85,10 +85,7 @@ pub fn matters() -> [(&'static str, Matter); 3] {
 /// The triangles of all that a scene holds, internal units; their vertices are joined where f32 has moved them apart.
 pub fn corners(scene: &crate::Scene) -> Vec<Corners> {
     let snapped = |p: DVec3| (p * GRID).round() / GRID;
-    let corners = scene.triangles.iter().map(|t| {
-        let corner = t.corner.as_dvec3();
-        [corner, corner + t.edge1.as_dvec3(), corner + t.edge2.as_dvec3()].map(snapped)
-    });
+    let corners = scene.triangles.iter().map(|t| t.vertices.map(|vertex| snapped(vertex.as_dvec3())));
     corners.filter(|[a, b, c]| (b - a).cross(c - a).length_squared() > 0.0).collect()
 }
 

@@ -310,8 +310,8 @@ fn direction_pdf(inputs: &Inputs, normal: DVec3, wi: DVec3) -> f64 {
 
 /// Weights of the second and third vertex of a point in the plane of a triangle.
 fn barycentric(triangle: &Triangle, point: DVec3) -> DVec2 {
-    let (edge1, edge2) = (triangle.edge1.as_dvec3(), triangle.edge2.as_dvec3());
-    let p = point - triangle.corner.as_dvec3();
+    let [corner, edge1, edge2] = triangle.corner_and_edges();
+    let p = point - corner;
     let normal = edge1.cross(edge2);
     let scale = normal.length_squared();
     DVec2::new(p.cross(edge2).dot(normal) / scale, edge1.cross(p).dot(normal) / scale)

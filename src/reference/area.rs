@@ -16,10 +16,7 @@ pub type Corners = [DVec3; 3];
 
 /// The triangles of one set, and all others.
 pub fn corners(triangles: &[Triangle], set: u32) -> (Vec<Corners>, Vec<Corners>) {
-    let corners = |t: &&Triangle| {
-        let (corner, edge1, edge2) = (t.corner.as_dvec3(), t.edge1.as_dvec3(), t.edge2.as_dvec3());
-        [corner, corner + edge1, corner + edge2]
-    };
+    let corners = |t: &&Triangle| t.vertices.map(|vertex| vertex.as_dvec3());
     let (own, others): (Vec<&Triangle>, Vec<&Triangle>) = triangles.iter().partition(|t| t.set == set);
     (own.iter().map(corners).collect(), others.iter().map(corners).collect())
 }

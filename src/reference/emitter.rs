@@ -56,7 +56,8 @@ pub fn table(triangles: &[Triangle], shadings: &[Shading], materials: &[Material
 }
 
 fn area(triangle: &Triangle) -> f64 {
-    triangle.edge1.as_dvec3().cross(triangle.edge2.as_dvec3()).length() / 2.0
+    let [_, edge1, edge2] = triangle.corner_and_edges();
+    edge1.cross(edge2).length() / 2.0
 }
 
 /// A point of an emitter as a position sees it.
@@ -82,8 +83,8 @@ pub fn draw(inputs: &Inputs, x: DVec3, u1: f64, u2: f64) -> Point {
     let barycentric = DVec2::new(s * (1.0 - u2), s * u2);
     let triangle = inputs.emitters[k].triangle;
     let shape = &inputs.triangles[triangle as usize];
-    let to =
-        shape.corner.as_dvec3() + barycentric.x * shape.edge1.as_dvec3() + barycentric.y * shape.edge2.as_dvec3() - x;
+    let [corner, edge1, edge2] = shape.corner_and_edges();
+    let to = corner + barycentric.x * edge1 + barycentric.y * edge2 - x;
     let (wi, distance) = (to.normalize(), to.length());
     let radiance = radiance(inputs, triangle, barycentric, wi);
     Point { wi, distance, triangle, radiance, density: density(inputs, triangle, wi, distance) }

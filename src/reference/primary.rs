@@ -43,9 +43,8 @@ pub fn primary(inputs: &Inputs, step: &Step, index: u32) -> Surface {
         None => Surface { triangle: MISS, ..Default::default() },
         Some(hit) => {
             let triangle = &inputs.triangles[hit.triangle as usize];
-            let position = triangle.corner.as_dvec3()
-                + hit.barycentric.x * triangle.edge1.as_dvec3()
-                + hit.barycentric.y * triangle.edge2.as_dvec3();
+            let [corner, edge1, edge2] = triangle.corner_and_edges();
+            let position = corner + hit.barycentric.x * edge1 + hit.barycentric.y * edge2;
             let barycentric = Vec2::new(hit.barycentric.x as f32, hit.barycentric.y as f32);
             Surface { position: position.as_vec3(), triangle: hit.triangle, barycentric }
         }

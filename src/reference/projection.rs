@@ -62,7 +62,8 @@ pub struct Seen {
 
 /// Unit normal of a triangle, out of the matter.
 pub fn geometric_normal(triangle: &Triangle) -> DVec3 {
-    triangle.edge1.as_dvec3().cross(triangle.edge2.as_dvec3()).normalize()
+    let [_, edge1, edge2] = triangle.corner_and_edges();
+    edge1.cross(edge2).normalize()
 }
 
 /// Shading normal of triangle `index`, out of the matter: interpolated between the vertices, then turned by the normal

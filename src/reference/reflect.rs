@@ -44,7 +44,7 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
     let cosine = |wi: DVec3| if seen.normal.dot(wi) > 0.0 { lobe.normal.dot(wi).max(0.0) } else { 0.0 };
     // Positions round as the vertices do, and opaque surfaces may reach far beyond the unit ball.
     let triangle = &inputs.triangles[surface.triangle as usize];
-    let extent = triangle.corner.abs().max(triangle.edge1.abs()).max(triangle.edge2.abs()).max_element().max(1.0);
+    let extent = triangle.vertices.iter().fold(1.0, |extent: f32, vertex| extent.max(vertex.abs().max_element()));
     let origin = lifted(point, seen.normal * f64::from(extent));
     let directions = f64::from(inputs.view.directions);
 

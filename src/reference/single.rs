@@ -262,7 +262,8 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
 }
 
 fn on_triangle(triangle: &Triangle, barycentric: DVec2) -> DVec3 {
-    triangle.corner.as_dvec3() + barycentric.x * triangle.edge1.as_dvec3() + barycentric.y * triangle.edge2.as_dvec3()
+    let [corner, edge1, edge2] = triangle.corner_and_edges();
+    corner + barycentric.x * edge1 + barycentric.y * edge2
 }
 
 /// A direction from two numbers: half from the image of the environment, if there is one.

@@ -120,7 +120,8 @@ fn centre(renderer: &Renderer, geometry: &Geometry, surface: &Surface) -> Centre
     // Towards the eye, as the kernels turn it.
     let view = &renderer.prepared.view;
     let to = view.forward + view.perspective * (surface.position - view.pivot);
-    let inner = triangle.edge1.cross(triangle.edge2).dot(to) > 0.0;
+    let [_, edge1, edge2] = triangle.corner_and_edges();
+    let inner = edge1.cross(edge2).dot(to.as_dvec3()) > 0.0;
     Centre {
         normal: if inner { -normal } else { normal },
         position,

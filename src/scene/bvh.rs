@@ -42,9 +42,8 @@ pub(super) fn build(file: &Path, triangles: &[shared::Triangle]) -> Result<(Vec<
 
 /// The box of a triangle, padded.
 fn bounds(triangle: &shared::Triangle) -> Aabb {
-    let corner = Vec3A::from(triangle.corner);
-    let (b, c) = (corner + Vec3A::from(triangle.edge1), corner + Vec3A::from(triangle.edge2));
-    let (low, high) = (corner.min(b).min(c), corner.max(b).max(c));
+    let [a, b, c] = triangle.vertices.map(Vec3A::from);
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
     let padding = Vec3A::splat(PADDING * low.abs().max(high.abs()).max_element().max(1.0));
     Aabb::new(low - padding, high + padding)
 }

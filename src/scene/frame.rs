@@ -49,11 +49,13 @@ pub(super) struct Internal {
     pub too_small: u64,
 }
 
-/// The geometry in internal units, without triangles too small for them. `coordinates` are none or one each.
+/// The geometry in internal units, without triangles too small for them. `positions` are those of the triangles' vertices
+/// (m), `coordinates` are none or one each.
 pub(super) fn internal(
     file: &Path,
     frame: &Frame,
     triangles: &[Triangle],
+    positions: &[DVec3],
     coordinates: &[shared::Coordinates],
 ) -> Result<Internal> {
     let mut kept = Vec::with_capacity(triangles.len());
@@ -68,15 +70,16 @@ pub(super) fn internal(
                 return Err(Error::scene(file, "scene", problem));
             }
         }
-        let corner = ((triangle.corner - frame.centre) * frame.scale).as_vec3();
-        let edge1 = (triangle.edge1 * frame.scale).as_vec3();
-        let edge2 = (triangle.edge2 * frame.scale).as_vec3();
-        if edge1.as_dvec3().cross(edge2.as_dvec3()).length() <= AREA_MIN {
+        // From the placed vertex and not from the triangle's edges, so that all triangles there have the same bits.
+        let vertices = triangle.vertices.map(|v| ((positions[v as usize] - frame.centre) * frame.scale).as_vec3());
+        let kept_triangle = shared::Triangle { vertices, set: triangle.set };
+        let [_, edge1, edge2] = kept_triangle.corner_and_edges();
+        if edge1.cross(edge2).length() <= AREA_MIN {
             dropped += 1;
             continue;
         }
         kept_coordinates.extend(coordinates.get(index));
-        kept.push(shared::Triangle { corner, edge1, edge2, set: triangle.set });
+        kept.push(kept_triangle);
         let [normal0, normal1, normal2]: [Vec3; 3] = triangle.normals;
         shadings.push(shared::Shading { normal0, normal1, normal2, material: triangle.material });
     }

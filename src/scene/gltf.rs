@@ -17,6 +17,8 @@ use std::{borrow::Cow, collections::BTreeMap, path::Path};
 /// What a file holds, in metres.
 pub(super) struct Raw {
     pub triangles: Vec<mesh::Triangle>,
+    /// Placed vertices (m).
+    pub positions: Vec<glam::DVec3>,
     /// One for each triangle, or none without textures.
     pub coordinates: Vec<Coordinates>,
     pub dropped: u64,
@@ -124,13 +126,14 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
             lights.push(read_light(node, item, name, transform, options.unit)?);
         }
     }
-    let Finished { triangles, coordinates, sets, dropped } = meshes.finish(file, &mut materials, &mut warnings)?;
+    let Finished { triangles, positions, coordinates, sets, dropped } =
+        meshes.finish(file, &mut materials, &mut warnings)?;
     if triangles.is_empty() {
         let dropped = if dropped == 0 { String::new() } else { format!(" but {dropped} of zero area") };
         return Err(Error::scene(file, "scene", format!("has no triangles{dropped}")));
     }
     let pictures = read_pictures(&root, &arrays, &mut materials)?;
-    Ok(Raw { triangles, coordinates, dropped, materials, pictures, sets, lights, cameras, warnings })
+    Ok(Raw { triangles, positions, coordinates, dropped, materials, pictures, sets, lights, cameras, warnings })
 }
 
 /// The pictures that the materials' textures show, which are numbered anew.

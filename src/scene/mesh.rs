@@ -328,14 +328,16 @@ impl<'r, 'a> Meshes<'r, 'a> {
             true => self.triangles.iter().filter_map(|triangle| self.final_coordinates(triangle)).collect(),
             false => Vec::new(),
         };
-        let Meshes { triangles, dropped, .. } = self;
-        Ok(Finished { triangles, coordinates, sets, dropped })
+        let Meshes { triangles, positions, dropped, .. } = self;
+        Ok(Finished { triangles, positions, coordinates, sets, dropped })
     }
 }
 
 /// All triangles of a scene.
 pub(super) struct Finished {
     pub triangles: Vec<Triangle>,
+    /// Placed vertices (m).
+    pub positions: Vec<DVec3>,
     /// One for each triangle, or none without textures.
     pub coordinates: Vec<Coordinates>,
     pub sets: Vec<Set>,

@@ -127,12 +127,22 @@ impl Scene {
         if !(1e-9..=1e9).contains(&options.unit) {
             return Err(Error::setting("unit", format!("must be from 1e-9 to 1e9 metres, is {}", options.unit)));
         }
-        let gltf::Raw { triangles, coordinates, dropped, materials, pictures, sets, lights, cameras, mut warnings } =
-            gltf::read(file, bytes, options)?;
+        let gltf::Raw {
+            triangles,
+            positions,
+            coordinates,
+            dropped,
+            materials,
+            pictures,
+            sets,
+            lights,
+            cameras,
+            mut warnings,
+        } = gltf::read(file, bytes, options)?;
         let frame = frame::around(file, &triangles, &materials)?;
         frame::check_nodes(file, &frame, &lights, &cameras)?;
         let frame::Internal { triangles, shadings, coordinates, too_small } =
-            frame::internal(file, &frame, &triangles, &coordinates)?;
+            frame::internal(file, &frame, &triangles, &positions, &coordinates)?;
         if too_small > 0 {
             warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
         }

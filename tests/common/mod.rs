@@ -2,7 +2,7 @@
 
 pub mod sphere;
 
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use translucent::Normalisation;
 use translucent::reference::accumulate::accumulate;
@@ -106,21 +106,15 @@ impl World {
 
     /// Adds a flat triangle of material 0 and set 0, counter-clockwise seen from outside.
     pub fn triangle(&mut self, [a, b, c]: [DVec3; 3]) {
-        self.triangles.push(Triangle {
-            corner: a.as_vec3(),
-            edge1: (b - a).as_vec3(),
-            edge2: (c - a).as_vec3(),
-            set: 0,
-        });
+        self.triangles.push(Triangle { vertices: [a, b, c].map(|vertex| vertex.as_vec3()), set: 0 });
         let normal = (b - a).cross(c - a).normalize().as_vec3();
         self.shadings.push(Shading { normal0: normal, normal1: normal, normal2: normal, material: 0 });
     }
 
     /// The surface at `position` on triangle `index`.
     pub fn surface(&self, index: u32, position: DVec3) -> Surface {
-        let t = self.triangles[index as usize];
-        let m = Mat3::from_cols(t.edge1, t.edge2, t.edge1.cross(t.edge2)).as_dmat3();
-        let weights = m.inverse() * (position - t.corner.as_dvec3());
+        let [corner, edge1, edge2] = self.triangles[index as usize].corner_and_edges();
+        let weights = DMat3::from_cols(edge1, edge2, edge1.cross(edge2)).inverse() * (position - corner);
         Surface {
             position: position.as_vec3(),
             triangle: index,

@@ -82,13 +82,7 @@ impl Disk {
                 hits.t[hits.count as usize] = t as f32;
                 hits.triangle[hits.count as usize] = triangles.len() as u32;
                 hits.count += 1;
-                let [corner, b, c] = tangent(point);
-                triangles.push(Triangle {
-                    corner: corner.as_vec3(),
-                    edge1: (b - corner).as_vec3(),
-                    edge2: (c - corner).as_vec3(),
-                    set: 0,
-                });
+                triangles.push(Triangle { vertices: tangent(point).map(|vertex| vertex.as_vec3()), set: 0 });
                 let normal = point.as_vec3();
                 let material = shadings[case].material;
                 shadings.push(Shading { normal0: normal, normal1: normal, normal2: normal, material });
@@ -114,7 +108,7 @@ impl Disk {
         let inputs = self.world.inputs();
         let estimate = |(case, sums): (usize, &[Sums])| {
             let seen = seen(&inputs, &self.surfaces[case]);
-            let factor = 1.0 / f64::from(samples) / transmittance(IOR, seen.normal.dot(seen.wo));
+            let factor = 1.0 / f64::from(samples) / transmittance(IOR, seen.shading_normal.dot(seen.wo));
             let radiance = |s: &Sums| (s.subsurface.as_dvec3() + s.subsurface_carry.as_dvec3()) * factor;
             Estimate::of(&sums.iter().map(radiance).collect::<Vec<_>>())
         };

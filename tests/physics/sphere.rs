@@ -10,7 +10,7 @@ use translucent::reference::accumulate::{accumulate, choose};
 use translucent::reference::boundary::{Side, diffuse_reflectance, transmittance};
 use translucent::reference::profile::{Dipole, Radial};
 use translucent::reference::profile::{plane_density, shapes};
-use translucent::reference::projection::{CAMERA, density, fractions, seen};
+use translucent::reference::projection::{CAMERA, density, fractions, geometric_normal, seen};
 use translucent::reference::random::hash;
 use translucent::reference::sample::sample;
 use translucent::reference::step;
@@ -54,7 +54,7 @@ impl Ball {
         let hits = self.hits(&probe, world);
         let contribution = accumulate(&world.inputs(), step, index, &self.surface, &probe, &hits);
         let seen = seen(&self.world.inputs(), &self.surface);
-        valid(contribution) / transmittance(IOR, seen.normal.dot(seen.wo))
+        valid(contribution) / transmittance(IOR, seen.shading_normal.dot(seen.wo))
     }
 
     fn estimate(&self, samples: u32) -> Estimate {
@@ -159,7 +159,8 @@ fn the_given_method_divides_by_its_density() {
             }
             found += 1;
             let delta = probe.offset.as_dvec3() + f64::from(hits.t[0]) * probe.direction.as_dvec3();
-            let normal = (ball.position + delta).normalize();
+            // Of the small triangle whose vertices are rounded.
+            let normal = geometric_normal(&world.triangles[hits.triangle[0] as usize]);
             let r = probe.offset.as_dvec3().length();
             let jacobian =
                 density(CAMERA, (&material).into(), &seen, delta, normal) / plane_density((&material).into(), r);

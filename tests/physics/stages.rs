@@ -229,7 +229,7 @@ fn both_sides_of_a_surface_are_the_same_matter() {
     let world = still_life(PROJECTION_MIS, 8, 8);
     let mut turned = world.clone();
     for (t, s) in turned.triangles.iter_mut().zip(&mut turned.shadings).take(12) {
-        std::mem::swap(&mut t.edge1, &mut t.edge2);
+        t.vertices.swap(1, 2);
         (s.normal0, s.normal1, s.normal2) = (-s.normal0, -s.normal2, -s.normal1);
     }
     let (a, b) = (render(&world.inputs(), 0..8, 0..16), render(&turned.inputs(), 0..8, 0..16));

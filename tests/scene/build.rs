@@ -108,14 +108,7 @@ pub fn refusal(json: &Value) -> String {
 /// The vertices of every triangle in metres, in no order: what the internal geometry stands for.
 pub fn metres(scene: &Scene) -> Vec<[DVec3; 3]> {
     let back = |internal: DVec3| internal / scene.frame.scale + scene.frame.centre;
-    scene
-        .triangles
-        .iter()
-        .map(|triangle| {
-            let corner = triangle.corner.as_dvec3();
-            [back(corner), back(corner + triangle.edge1.as_dvec3()), back(corner + triangle.edge2.as_dvec3())]
-        })
-        .collect()
+    scene.triangles.iter().map(|triangle| triangle.vertices.map(|vertex| back(vertex.as_dvec3()))).collect()
 }
 
 /// Whether two scenes hold the same triangles within `tolerance` metres, in any order and starting at any vertex.

@@ -77,9 +77,7 @@ pub fn check(scene: &Scene) -> usize {
             let first = node.first_triangle + (node.meta[child] & 31) as u32;
             for triangle in first..first + count {
                 met[triangle as usize] += 1;
-                let triangle = &scene.triangles[triangle as usize];
-                let corner = triangle.corner.as_dvec3();
-                for vertex in [corner, corner + triangle.edge1.as_dvec3(), corner + triangle.edge2.as_dvec3()] {
+                for vertex in scene.triangles[triangle as usize].vertices.map(|vertex| vertex.as_dvec3()) {
                     for (low, high) in &boxes {
                         assert!(vertex.cmpge(*low).all() && vertex.cmple(*high).all(), "{vertex} in {low} to {high}");
                     }

@@ -220,7 +220,8 @@ fn tangents_point_along_u_and_up_the_picture() {
         json["nodes"][0] = node;
         let scene = load(&json);
         let (c, t) = (scene.coordinates[0], scene.triangles[0]);
-        let normal = t.edge1.cross(t.edge2).normalize();
+        let [_, edge1, edge2] = t.corner_and_edges();
+        let normal = edge1.cross(edge2).normalize().as_vec3();
         (c.tangent[1], c.handedness * normal.cross(c.tangent[1]))
     };
     let (x, y) = (glam::Vec3::X, glam::Vec3::Y);
