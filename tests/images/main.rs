@@ -1,6 +1,7 @@
 //! Whole renders on the device: against closed forms, against the independent area integrator, against the twins,
 //! and against themselves. Under the validation layer with synchronization checks.
 
+mod bad_meshes;
 mod closed_forms;
 mod edge_cases;
 mod emitters;
@@ -14,6 +15,7 @@ mod measure;
 mod mixtures;
 mod repeatable;
 mod scenes;
+mod single;
 mod statistics;
 mod table;
 mod textures;

@@ -5,6 +5,10 @@ mod inspect;
 mod interrupt;
 mod measure;
 mod merge;
+#[allow(dead_code)]
+#[path = "../images/scenes.rs"]
+mod scenes;
+mod textures;
 mod usage;
 
 use std::{
