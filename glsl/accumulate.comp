@@ -17,11 +17,32 @@ SHADINGS(readonly);
 SURFACES(readonly);
 PROBES(readonly);
 HIT_LISTS(readonly);
+#include "mixture.glsl"
 
 // Weights of the second and third vertex at a point of a triangle, from its corner.
 vec2 weights(Triangle triangle, vec3 from_corner) {
     vec3 n = cross(triangle.edge1, triangle.edge2);
     return vec2(dot(cross(from_corner, triangle.edge2), n), dot(cross(triangle.edge1, from_corner), n)) / dot(n, n);
+}
+
+// The matter that light enters at a point of a triangle; `m` is that of the surface that is seen.
+Material entered_matter(Material m, Surface surface, uint triangle, vec2 barycentric) {
+    if (MIXED != 0) {
+        m = materials[shadings[triangle].material];
+        if (has_model(m, MODEL_TABLE)) table_at(m, surface);
+    }
+    return textured_medium(m, triangle, barycentric);
+}
+
+// Density of the hit at xo + delta: the mean over the media of the set.
+float hit_density(Seen s, Material m, Surface surface, vec3 delta, vec3 n) {
+    if (MIXED == 0) return mixture_density(s, m, delta, n);
+    Mixture mixture = mixture_at(surface);
+    float sum = 0.0;
+    for (uint k = 0u; k < min(mixture.count, MAX_MEMBERS); k++) {
+        sum += mixture_density(s, mixture_member(mixture, k, surface), delta, n);
+    }
+    return sum / float(mixture.count);
 }
 
 // 1 / density of the hit at xo + delta under the camera projection, but for e^{rate radius}, which goes into the profile.
@@ -59,7 +80,11 @@ void main() {
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
     if ((m.flags & TRANSLUCENT) == 0u) return;
-    if (has_model(m, MODEL_TABLE)) table_at(m, surface);
+    if (MIXED != 0) {
+        m.camera_rate = mixture_at(surface).camera_rate;
+    } else if (has_model(m, MODEL_TABLE)) {
+        table_at(m, surface);
+    }
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));
     uint batch = sample_index() % BATCHES;
@@ -71,7 +96,7 @@ void main() {
     float shift = 0.0;
     vec3 factor;
     Material local;
-    bool own_value = has_model(m, MODEL_DIRECTIONAL);
+    bool own_value = false;
     if (has_model(m, MODEL_LAMBERT)) {
         local = textured_medium(m, lit, barycentric);
         factor = local.strength;
@@ -91,14 +116,12 @@ void main() {
             uint triangle = hit_lists[index].triangle[j];
             vec3 n = geometric_normal(triangles[triangle]);
             vec3 from_corner = (s.position - triangles[triangle].corner) + delta;
-            Material local = textured_medium(m, triangle, weights(triangles[triangle], from_corner));
+            float p = PROJECTION == PROJECTION_CAMERA ? 1.0 : hit_density(s, m, surface, delta, n);
+            Material local = entered_matter(m, surface, triangle, weights(triangles[triangle], from_corner));
             vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift);
-            float p = 1.0;
-            if (PROJECTION == PROJECTION_CAMERA) {
-                f *= camera_factor(s, m, probe, delta, n);
-            } else {
-                p = mixture_density(s, m, delta, n);
-            }
+            if (PROJECTION == PROJECTION_CAMERA) f *= camera_factor(s, m, probe, delta, n);
+            // In the opaque limit light leaves nowhere else.
+            if (MIXED != 0 && has_model(local, MODEL_LAMBERT)) f = vec3(0.0);
             total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
             cumulative[j] = total;
         }
@@ -112,7 +135,8 @@ void main() {
         delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
         lit = hit_lists[index].triangle[chosen];
         barycentric = weights(triangles[lit], (s.position - triangles[lit].corner) + delta);
-        local = textured_medium(m, lit, barycentric);
+        local = entered_matter(m, surface, lit, barycentric);
+        own_value = has_model(local, MODEL_DIRECTIONAL);
         float given = PROJECTION == PROJECTION_CAMERA
             ? camera_factor(s, m, probe, delta, s.side * geometric_normal(triangles[lit])) : 1.0;
         vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift) * given;
@@ -177,15 +201,17 @@ void main() {
             if (k >= first_direction || found == target) hit_count = 0u;
         }
         if (open && hit_count == 0u) {
-            light *= crossing(m, cos_shading);
-            light *= obliqueness(m, cos_shading, false);
+            light *= crossing(local, cos_shading);
+            light *= obliqueness(local, cos_shading, false);
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }
     }
 
     float cos_eye = dot(s.shading_normal, s.wo);
-    vec3 radiance = crossing(m, cos_eye) * obliqueness(m, cos_eye, true) * factor * entering;
+    vec3 radiance = crossing(m, cos_eye) * obliqueness(local, cos_eye, true) * factor * entering;
+    if (has_model(local, MODEL_TABLE)) radiance *= table_balance(local, surface);
+    if (MIXED != 0) radiance *= m.exit;
     // The base colour tints what crosses the surface, there and here.
     if (has_texture(TEXTURE_BASE_COLOR)) {
         radiance *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb

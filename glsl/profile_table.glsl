@@ -2,6 +2,7 @@
 // src/table/block.rs.
 PROFILES(readonly);
 THICKNESS(readonly);
+BALANCES(readonly);
 
 // The curvatures of the table around that of the surface that is seen: the first of two, its weight, how distances bend
 // for both, and 1/4a^2. Without curvatures there is the half-space alone.
@@ -18,6 +19,8 @@ uint table_base(Material m, uint node) {
 void table_at(Material m, Surface surface) {
     if (m.model != MODEL_TABLE) return;
     table_node = m.table_nodes - 1u;
+    table_weight = 1.0;
+    table_bend = vec2(0.0);
     if (CURVATURE == 0) return;
     vec2 b = surface.barycentric;
     float curvature = dot(thickness[surface.triangle], vec3(1.0 - b.x - b.y, b));
@@ -149,4 +152,12 @@ vec3 table_obliqueness(Material m, vec3 slope, float c, bool leaving) {
     float inside = sqrt(max(1.0 - (1.0 - c * c) / (m.ior * m.ior), 0.0));
     vec3 factor = 1.0 + slope * (1.0 - inside);
     return leaving ? factor / (1.0 + slope * m.obliqueness) : factor;
+}
+
+// What the profile is multiplied by at the surface that is seen, so that it gives back what its sphere does.
+vec3 table_balance(Material m, Surface surface) {
+    if (CURVATURE == 0) return vec3(1.0);
+    vec2 b = surface.barycentric;
+    vec3 at[3] = balances[m.balance + surface.triangle].at;
+    return at[0] * (1.0 - b.x - b.y) + at[1] * b.x + at[2] * b.y;
 }

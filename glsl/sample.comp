@@ -9,6 +9,7 @@
 #include "projection.glsl"
 TRIANGLES(readonly);
 SHADINGS(readonly);
+#include "mixture.glsl"
 SURFACES(readonly);
 PROBES(writeonly);
 
@@ -26,15 +27,22 @@ void main() {
     if (surface.triangle == MISS) return;
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
-    if ((m.flags & TRANSLUCENT) == 0 || m.component_cdf[8] == 0.0) return;
+    if ((m.flags & TRANSLUCENT) == 0) return;
 
-    if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     View view = views[0];
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     uint key = pixel_key(view.seed, pixel_position(view, index));
     uint batch = sample_index() % BATCHES;
     float u[4];
     for (uint i = 0; i < 4; i++) u[i] = unit(scramble(sample_point(i), dimension_key(key, batch, i)));
+    if (MIXED != 0) {
+        Mixture mixture = mixture_at(surface);
+        if (mixture.count == 0u) return;
+        m = mixture_member(mixture, pick_member(mixture, u[DIM_COMPONENT]), surface);
+    } else {
+        if (m.component_cdf[8] == 0.0) return;
+        if (has_model(m, MODEL_TABLE)) table_at(m, surface);
+    }
 
     vec4 fractions = technique_fractions(dot(s.wo, s.normal));
     float u_technique = u[DIM_TECHNIQUE];

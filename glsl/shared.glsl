@@ -31,6 +31,8 @@ const float EMITTER_REACH = 0.9999962;
 const uint BOUNDARY_NODES = 128u;
 // Least GGX width of an opaque material, which has no mirror.
 const float OPAQUE_ALPHA_MIN = 0.001;
+// Most media of one set of surfaces that exchange light.
+const uint MAX_MEMBERS = 8u;
 // Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
 const uint BVH_DEPTH = 24u;
 // Value of `Surface::triangle` for a ray that hits nothing.
@@ -159,6 +161,8 @@ layout(constant_id = 5) const uint MODELS = 0;
 layout(constant_id = 10) const uint CURVATURE = 0;
 // 1 where a caller's recordings keep count of the samples on the device.
 layout(constant_id = 20) const uint RECORDED = 0;
+// 1 where a set holds several materials.
+layout(constant_id = 11) const uint MIXED = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -298,7 +302,7 @@ struct Material {
     // Directional dipole: C_E.
     float c_e;
     // Radiance per unit shape(r) and unit flux that entered: for dipoles alpha'/2 / (pi (1 - rho_e)); /pi alone for
-    // jensen2001.
+    // jensen2001; without either where sets hold several materials.
     vec3 strength;
     // Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
     vec3 density;
@@ -335,12 +339,34 @@ struct Material {
     float obliqueness;
     // Opaque limit of a table: slope of the total in 1 - cosine of refraction.
     vec3 slope;
+    // Table: the number of triangle 0 in Balances, for this material's profile.
+    uint balance;
     // Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
     uint flags;
     // First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
     uint ramp;
     // 1 + the number of its table in Boundaries; 0 for a smooth boundary.
     uint boundary;
+    // Where sets hold several materials: what strength and beam leave out and the exit's material brings, its tint over
+    // pi (1 - rho_e).
+    vec3 exit;
+};
+
+// Factor on a material's tabulated profile at a triangle, with which it gives back what its sphere does.
+struct Balance {
+    // At the three vertices.
+    vec3 at[3];
+};
+
+// The media of a set of several materials.
+struct Mixture {
+    // A material of each medium that scatters; radii are drawn from each with the same probability.
+    uint members[8];
+    uint count;
+    // Largest radius_max of the members.
+    float radius_max;
+    // Smallest camera_rate of the members.
+    float camera_rate;
 };
 
 // One texture of a material. Texel (0, 0) is the upper left one, at the coordinates (0, 0).
@@ -510,5 +536,9 @@ struct Pixel {
 #define SAMPLES(access) layout(set = 0, binding = 24, scalar) access buffer SamplesBlock { Sample samples[]; }
 // Light (R, G, B) and alpha of each pixel, row by row from the upper left.
 #define COLORS(access) layout(set = 0, binding = 25, scalar) access buffer ColorsBlock { vec4 colors[]; }
+// One for each set, where a set holds several materials.
+#define MIXTURES(access) layout(set = 0, binding = 26, scalar) access buffer MixturesBlock { Mixture mixtures[]; }
+// Balances of each triangle, once for as many materials as its set has.
+#define BALANCES(access) layout(set = 0, binding = 27, scalar) access buffer BalancesBlock { Balance balances[]; }
 
 layout(push_constant, scalar) uniform StepBlock { Step step_; };

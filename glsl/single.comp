@@ -179,8 +179,10 @@ void main() {
                     float ratio = c / cos_inside;
                     vec3 scattered = vec3(phase(m.g.x, d, inner), phase(m.g.y, d, inner), phase(m.g.z, d, inner));
                     vec3 exponent = (least - m.extinction) * depth - m.extinction * (along * ratio);
+                    Material boundary = m;
+                    if (MIXED != 0) boundary = materials[shadings[found].material];
                     part = over_density * scattered * exp_(exponent)
-                        * (crossing(m, c) * ratio / (m.ior * m.ior));
+                        * (crossing(boundary, c) * ratio / (m.ior * m.ior));
                     if (has_texture(TEXTURE_BASE_COLOR)) {
                         part *= texture_value(TEXTURE_BASE_COLOR, found, hit_barycentric).rgb;
                     }

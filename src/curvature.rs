@@ -11,6 +11,8 @@
 //! take mean or harmonic chords, see a plate four to seven diffuse mean free paths thick as a ball, and are 11 to 14 % too
 //! bright there.
 
+pub mod balance;
+
 use crate::reference::walk::mesh::{Corners, Mesh};
 use crate::reference::walk::shape::{Met, Shape};
 use crate::shared::Triangle;
@@ -52,7 +54,8 @@ pub fn inverse_radii(triangles: &[Triangle], lengths: &[Option<f64>]) -> Vec<Vec
     radii
 }
 
-fn corners(triangle: &Triangle) -> Corners {
+/// The vertices of a triangle.
+pub fn corners(triangle: &Triangle) -> Corners {
     let (corner, edge1, edge2) = (triangle.corner.as_dvec3(), triangle.edge1.as_dvec3(), triangle.edge2.as_dvec3());
     [corner, corner + edge1, corner + edge2]
 }
@@ -66,21 +69,37 @@ pub fn of_mesh(corners: &[Corners], length: f64, directions: usize) -> Vec<Vec3>
         let of = |corner: DVec3| inverse_radius(&mesh, (a + b + c) / 6.0 + corner / 2.0, normal, length, directions);
         [of(a), of(b), of(c)]
     };
-    let found: Vec<[f64; 3]> = (0..corners.len()).into_par_iter().map(near).collect();
-    let key = |p: DVec3| (p * GRID).round().to_array().map(|x| x as i64);
-    let mut vertices: HashMap<[i64; 3], (f64, f64)> = HashMap::new();
-    for (index, values) in found.iter().enumerate() {
-        let (area, ..) = mesh.facet(index);
-        for (corner, value) in corners[index].iter().zip(values) {
-            let (sum, weight) = vertices.entry(key(*corner)).or_default();
-            (*sum, *weight) = (*sum + area * value, *weight + area);
+    let found: Vec<[DVec3; 3]> =
+        (0..corners.len()).into_par_iter().map(|index| near(index).map(DVec3::splat)).collect();
+    let vertices = Vertices::new(corners, &found);
+    corners.iter().map(|triangle| Vec3::from(triangle.map(|corner| vertices.mean(corner).x as f32))).collect()
+}
+
+/// Means at vertices, over the triangles around them by area.
+struct Vertices(HashMap<[i64; 3], (DVec3, f64)>);
+
+impl Vertices {
+    fn new(corners: &[Corners], found: &[[DVec3; 3]]) -> Vertices {
+        let mut vertices = Vertices(HashMap::new());
+        for (triangle, values) in corners.iter().zip(found) {
+            let [a, b, c] = *triangle;
+            let area = (b - a).cross(c - a).length() / 2.0;
+            for (corner, value) in triangle.iter().zip(values) {
+                let (sum, weight) = vertices.0.entry(Vertices::key(*corner)).or_default();
+                (*sum, *weight) = (*sum + area * *value, *weight + area);
+            }
         }
+        vertices
     }
-    let mean = |corner: DVec3| {
-        let (sum, weight) = vertices[&key(corner)];
-        (sum / weight) as f32
-    };
-    corners.iter().map(|triangle| Vec3::from(triangle.map(mean))).collect()
+
+    fn key(place: DVec3) -> [i64; 3] {
+        (place * GRID).round().to_array().map(|x| x as i64)
+    }
+
+    fn mean(&self, corner: DVec3) -> DVec3 {
+        let (sum, weight) = self.0[&Vertices::key(corner)];
+        sum / weight
+    }
 }
 
 /// 1 / a at a point inside or on the surface, whose normal points outward.

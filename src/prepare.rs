@@ -1,20 +1,23 @@
 //! A scene and settings become what kernels read: f64 metres in, shared structs in internal units out.
 
+mod sets;
+
 use crate::{
-    curvature,
     error::{Error, Result},
     model::{self, Advice, Choice, Detail},
     reference::{
-        Inputs, emitter, light,
+        Inputs,
+        boundary::Side,
+        emitter, light,
         profile::{self, Coefficients, Dipole, Radial, lambert},
         rough::Boundaries,
         single::Scattering,
         texture,
     },
-    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Set, Wrap},
+    scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap},
     settings::{Model, Projection, Settings},
     shared::{
-        self, Emitter, Features, Light, MODEL_LAMBERT, Material, TABLE_NODES, TRANSLUCENT, TWO_SIDED, Texture, View,
+        self, Balance, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, TWO_SIDED, Texture, View,
     },
 };
 use glam::{DVec3, Vec3};
@@ -39,6 +42,10 @@ pub struct Prepared {
     pub profiles: Vec<f32>,
     /// Curvatures at the vertices of each triangle, none where no profile depends on them.
     pub thickness: Vec<Vec3>,
+    /// Balances of profiles and triangles, none where no profile depends on curvatures.
+    pub balances: Vec<Balance>,
+    /// Media of each set, none where no set holds several materials.
+    pub mixtures: Vec<Mixture>,
     /// The model of each material and why it; none for opaque ones.
     pub advice: Vec<Option<Advice>>,
     /// The camera that looks, for what is said about the image.
@@ -84,6 +91,8 @@ impl Prepared {
             coordinates: &scene.coordinates,
             profiles: &self.profiles,
             thickness: &self.thickness,
+            balances: &self.balances,
+            mixtures: &self.mixtures,
         }
     }
 }
@@ -145,9 +154,11 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
     let details = Detail::of(scene, &camera, height);
     let advice: Vec<_> = scene.materials.iter().zip(details).map(|(m, d)| model::advise(settings, m, d)).collect();
-    let thickness = thickness(scene, settings, &advice);
+    let thickness = sets::thickness(scene, settings, &advice);
     let (mut profiles, mut boundaries) = (vec![], Boundaries::default());
-    let materials = materials(scene, settings, &advice, &thickness, &mut profiles, &mut boundaries)?;
+    let mut materials = materials(scene, settings, &advice, &thickness, &mut profiles, &mut boundaries)?;
+    let balances = sets::balances(scene, &mut materials, &profiles, &thickness);
+    let mixtures = sets::mixtures(scene, &materials)?;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
@@ -203,6 +214,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         rough: u32::from(!boundaries.nodes.is_empty()),
         curvature: u32::from(!thickness.is_empty()),
         recorded: u32::from(settings.recording),
+        mixtures: u32::from(!mixtures.is_empty()),
         ..Features::default()
     };
     Ok(Prepared {
@@ -228,6 +240,8 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         textures,
         profiles,
         thickness,
+        balances,
+        mixtures,
         advice,
         camera,
         rows: y0..y1,
@@ -309,11 +323,13 @@ fn materials(
     profiles: &mut Vec<f32>,
     boundaries: &mut Boundaries,
 ) -> Result<Vec<Material>> {
+    let mixed = scene.sets.iter().any(sets::is_mixed);
+    let common = Common { frame: scene.frame, settings, thickness, mixed };
     let choice = |advice: &'_ Option<Advice>| advice.as_ref().map(|advice| advice.choice.clone());
-    let each = |(m, advice): (&scene::Material, &Option<Advice>)| {
-        material(m, choice(advice), scene.frame, settings, thickness, profiles, boundaries)
+    let mut each = |(m, advice): (&scene::Material, &Option<Advice>)| {
+        material(m, choice(advice), common, profiles, boundaries)
     };
-    let mut out = scene.materials.iter().zip(advice).map(each).collect::<Result<Vec<_>>>()?;
+    let mut out = scene.materials.iter().zip(advice).map(&mut each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
         out[index].ramp = out.len() as u32;
         let whole = out[index];
@@ -325,7 +341,7 @@ fn materials(
         let first = out.len();
         for medium in &authored.ramp {
             let node = scene::Material { medium: Some(medium.clone()), ..authored.clone() };
-            out.push(material(&node, choice.clone(), scene.frame, settings, thickness, profiles, boundaries)?);
+            out.push(each((&node, &advice[index]))?);
         }
         // Black matter has no lengths of its own.
         let mut next = out[first + 1];
@@ -374,7 +390,8 @@ pub(crate) fn replaced(
         return refuse("another rough boundary needs a new renderer");
     }
     let mut boundaries = Boundaries::default();
-    let mut made = material(new, choice, frame, settings, &[], &mut vec![], &mut boundaries)?;
+    let common = Common { frame, settings, thickness: &[], mixed: false };
+    let mut made = material(new, choice, common, &mut vec![], &mut boundaries)?;
     // The same roughness and index have the same table.
     let before = &prepared.materials[index];
     made.boundary = before.boundary;
@@ -444,51 +461,20 @@ fn textures(scene: &Scene) -> (Vec<u32>, Vec<Texture>, u32) {
     (texels, textures, kinds)
 }
 
-/// Curvatures at the vertices of the triangles, if a material has the table model and settings ask for them.
-fn thickness(scene: &Scene, settings: &Settings, advice: &[Option<Advice>]) -> Vec<Vec3> {
-    let tabulated = |m: &usize| advice[*m].as_ref().is_some_and(|a| a.choice.model == Model::Table);
-    // Where a set holds several media, the first one's light says how far to look around.
-    let length = |set: &Set| {
-        let medium = scene.materials[set.materials.iter().copied().find(tabulated)?].medium.as_ref()?;
-        Some(curvature::REACH * diffuse_mean_free_path(medium) * scene.frame.scale)
-    };
-    let lengths: Vec<Option<f64>> = scene.sets.iter().map(length).collect();
-    let wanted = settings.curvature && lengths.iter().any(Option::is_some);
-    if wanted { curvature::inverse_radii(&scene.triangles, &lengths) } else { vec![] }
-}
-
-/// 1 / sigma_tr (m), the geometric mean of the channels that scatter and absorb; infinite where none does.
-fn diffuse_mean_free_path(medium: &Medium) -> f64 {
-    let rates = [0, 1, 2].map(|c| {
-        let (scattering, absorption) = (medium.sigma_s_prime[c], medium.sigma_a[c]);
-        if scattering > 0.0 { (3.0 * absorption * (scattering + absorption)).sqrt() } else { 0.0 }
-    });
-    let logarithms: Vec<f64> = rates.into_iter().filter(|&rate| rate > 0.0).map(f64::ln).collect();
-    if logarithms.is_empty() {
-        return f64::INFINITY;
-    }
-    (-logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp()
-}
-
-/// Radii 2^(i/2 - 1) of the spheres between which a material's profiles are interpolated: those around the curvatures of
-/// the scene, up to 128 mean free paths, beyond which the half-space is next.
-fn spheres(thickness: &[Vec3], channels: &[Coefficients; 3]) -> Vec<i32> {
-    let all = || thickness.iter().flat_map(|c| c.to_array()).filter(|&c| c > 0.0).map(f64::from);
-    let (Some(least), Some(most)) = (all().reduce(f64::min), all().reduce(f64::max)) else { return vec![] };
-    let longest = channels.iter().filter(|c| c.sigma_s_prime > 0.0).map(|c| 1.0 / c.sigma_s_prime).fold(0.0, f64::max);
-    let number = |radius: f64| 2.0 * (2.0 * radius).log2();
-    let last = number((1.0 / least).min(128.0 * longest)).ceil() as i32;
-    let first = number(1.0 / most).floor() as i32;
-    // Bodies thinner than the first are interpolated as it is.
-    (first.max(last - (TABLE_NODES as i32 - 2))..=last).collect()
+/// What all materials of a scene are made with.
+#[derive(Clone, Copy)]
+struct Common<'a> {
+    frame: Frame,
+    settings: &'a Settings,
+    thickness: &'a [Vec3],
+    /// Whether a set holds several materials.
+    mixed: bool,
 }
 
 fn material(
     material: &scene::Material,
     choice: Option<Choice>,
-    frame: Frame,
-    settings: &Settings,
-    thickness: &[Vec3],
+    Common { frame, settings, thickness, mixed }: Common,
     profiles: &mut Vec<f32>,
     boundaries: &mut Boundaries,
 ) -> Result<Material> {
@@ -510,13 +496,20 @@ fn material(
             };
             let mut out = match choice.model {
                 Model::Table => {
-                    profile::tabulated(&coefficients, options, &spheres(thickness, &coefficients), profiles)
+                    profile::tabulated(&coefficients, options, &sets::spheres(thickness, &coefficients), profiles)
                 }
                 Model::Lambert => lambert::limit(constant(choice.limit_of), &coefficients, options),
                 model => profile::material(constant(model), &coefficients, options),
             };
             out.radius_max = out.radius_max.min(SET_DIAMETER);
             out.boundary = rough.map_or(0, |(table, _)| table);
+            if mixed {
+                // What belongs to the exit is another material's, there.
+                let leaving = options.leaving(coefficients[0].diffuse_reflectance(Side::Outside)) as f32;
+                out.strength *= leaving;
+                out.beam *= leaving;
+                out.exit = Vec3::splat(1.0 / leaving);
+            }
             if model::adds_single_scattering(settings, medium, choice.model) {
                 let vector = |value: fn(&Coefficients) -> f64| glam::DVec3::from(coefficients.each_ref().map(value));
                 let scattering = Scattering::new(vector(|c| c.sigma_s_prime), vector(|c| c.sigma_a), vector(|c| c.g));
@@ -536,9 +529,12 @@ fn material(
     };
     if material.tinted {
         // Light is tinted where it enters and where it leaves.
-        let tint = (material.base_color * material.base_color).as_vec3();
+        let twice = (material.base_color * material.base_color).as_vec3();
+        let tint = if mixed { material.base_color.as_vec3() } else { twice };
         out.strength *= tint;
         out.beam *= tint;
+        out.exit *= material.base_color.as_vec3();
+        out.scattering *= twice;
     }
     out.ior = material.ior as f32;
     out.alpha = alpha;

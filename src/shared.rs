@@ -195,6 +195,8 @@ constants! {
     BOUNDARY_NODES: u32 = 128;
     /// Least GGX width of an opaque material, which has no mirror.
     OPAQUE_ALPHA_MIN: f32 = 1e-3;
+    /// Most media of one set of surfaces that exchange light.
+    MAX_MEMBERS: u32 = 8;
     /// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
     BVH_DEPTH: u32 = 24;
     /// Value of `Surface::triangle` for a ray that hits nothing.
@@ -451,7 +453,7 @@ structs! {
         /// Directional dipole: C_E.
         c_e: f32,
         /// Radiance per unit shape(r) and unit flux that entered: for dipoles alpha'/2 / (pi (1 - rho_e)); /pi alone for
-        /// jensen2001.
+        /// jensen2001; without either where sets hold several materials.
         strength: Vec3,
         /// Channel probability over the shape's integral, b_c / mass_c: the density of r is dot(density, shape(r)).
         density: Vec3,
@@ -488,12 +490,34 @@ structs! {
         obliqueness: f32,
         /// Opaque limit of a table: slope of the total in 1 - cosine of refraction.
         slope: Vec3,
+        /// Table: the number of triangle 0 in Balances, for this material's profile.
+        balance: u32,
         /// Of TRANSLUCENT, TWO_SIDED and RECIPROCAL.
         flags: u32,
         /// First of RAMP + 1 materials whose medium goes from black to this one's; 0 where no texture changes it.
         ramp: u32,
         /// 1 + the number of its table in Boundaries; 0 for a smooth boundary.
         boundary: u32,
+        /// Where sets hold several materials: what strength and beam leave out and the exit's material brings, its tint over
+        /// pi (1 - rho_e).
+        exit: Vec3,
+    }
+
+    /// Factor on a material's tabulated profile at a triangle, with which it gives back what its sphere does.
+    struct Balance {
+        /// At the three vertices.
+        at: [Vec3; 3],
+    }
+
+    /// The media of a set of several materials.
+    struct Mixture {
+        /// A material of each medium that scatters; radii are drawn from each with the same probability.
+        members: [u32; 8],
+        count: u32,
+        /// Largest radius_max of the members.
+        radius_max: f32,
+        /// Smallest camera_rate of the members.
+        camera_rate: f32,
     }
 
     /// One texture of a material. Texel (0, 0) is the upper left one, at the coordinates (0, 0).
@@ -665,6 +689,10 @@ buffers! {
     Samples = 24: SAMPLES [Sample] samples;
     /// Light (R, G, B) and alpha of each pixel, row by row from the upper left.
     Colors = 25: COLORS [Vec4] colors;
+    /// One for each set, where a set holds several materials.
+    Mixtures = 26: MIXTURES [Mixture] mixtures;
+    /// Balances of each triangle, once for as many materials as its set has.
+    Balances = 27: BALANCES [Balance] balances;
 }
 
 features! {
@@ -688,6 +716,8 @@ features! {
     curvature = 10: CURVATURE,
     /// 1 where a caller's recordings keep count of the samples on the device.
     recorded = 20: RECORDED,
+    /// 1 where a set holds several materials.
+    mixtures = 11: MIXED,
 }
 
 impl Features {

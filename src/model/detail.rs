@@ -9,7 +9,8 @@ pub struct Detail {
     /// Width of a pixel where the material comes nearest to the eye; 0 if it may touch it, or nothing is known of the
     /// picture; infinite where nothing of it is in front of the camera.
     pub pixel: f64,
-    /// Thickness of its bodies; infinite where they are not closed.
+    /// Thickness of its bodies; infinite where they are not closed, 0 where other matter is in the same set, with which it
+    /// exchanges light however near.
     pub thickness: f64,
 }
 
@@ -37,6 +38,13 @@ impl Detail {
                 });
             }
             detail.thickness = detail.thickness.min(thicknesses[triangle.set as usize]);
+        }
+        for set in scene.sets.iter().filter(|set| set.materials.len() > 1) {
+            let pixel = set.materials.iter().map(|&m| details[m].pixel).fold(f64::INFINITY, f64::min);
+            for &material in &set.materials {
+                let detail = &mut details[material];
+                *detail = Detail { pixel: detail.pixel.min(pixel), thickness: 0.0 };
+            }
         }
         details
     }

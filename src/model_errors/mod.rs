@@ -8,18 +8,15 @@
 //! Lengths are in reduced mean free paths 1 / sigma_t'; scattering is isotropic; light is directional and looked at from
 //! 60 degrees aside. A cell holds percent of what leaves by the walk: the signed error of all light that leaves, of the
 //! mean that a camera sees, and the sum of the absolute errors of some two dozen parts of the surface. On the half-space
-//! there is no camera, and a thin beam's parts are rings. "unscattered" is the part of the entering light that crosses the
-//! body straight; it is not compared, but the spheres of the table model hold it, and show it as an excess where it is
-//! large. Standard errors, and what noise alone makes of the last number, are in `src/docs/model_errors.csv`.
+//! there is no camera, and a thin beam's parts are rings. All that leaves counts, also "unscattered", the part of the
+//! entering light that crosses the body straight: the renderer has nothing but the model for it, and the spheres of the
+//! table model hold it. Standard errors, and what noise alone makes of the last number, are in `src/docs/model_errors.csv`.
 //! Ten thousand paths a scene: means are good to 1 to 3 %, absolute errors of parts below about 10 % on meshes are noise.
 //!
 //! # What they say
 //! - A profile of the half-space loses light on small and thin bodies, whichever it is. "table on spheres" takes at each
-//!   point the profile of the sphere that the body is [locally like](mod@crate::curvature), which mends the mean on
-//!   spheres, capsules and animals.
-//! - It overshoots on plates thinner than three diffuse mean free paths: within a chord r there lies up to twice the area
-//!   pi r^2 of a sphere, so that more light leaves than the profile holds. Dividing by the integral of the profile over
-//!   the body at each point would mend that; it is not built.
+//!   point the profile of the sphere that the body is [locally like](mod@crate::curvature), and as much of it as makes the
+//!   body give back what that sphere does ([balance](mod@crate::curvature::balance)).
 //! - The directional dipole makes light; Burley's lengths are fits for index-matched matter.
 //!
 //! `cargo run --release --example model_errors` measures them anew.
@@ -64,7 +61,7 @@ pub struct Row {
     pub matter: &'static str,
     pub scene: String,
     pub model: &'static str,
-    /// Light that passes without being scattered, which no model holds, over what entered; none on a half-space.
+    /// Light that passes without being scattered, over what entered; none on a half-space.
     pub straight: f64,
     /// Share of the walk's paths that were lost.
     pub lost: f64,
@@ -147,14 +144,14 @@ pub fn on_body(matter: (&'static str, Matter), scene: &Scene, effort: Effort) ->
         let pairs = || prediction.bins.iter().zip(&truth.bins);
         let wrong: f64 = pairs().map(|(a, b)| (a.mean - b.mean).abs()).sum();
         let noise: f64 = pairs().map(|(a, b)| a.error.hypot(b.error)).sum();
-        let all = truth.scattered.mean;
+        let all = truth.all.mean;
         Row {
             matter: name,
             scene: scene.name.clone(),
             model,
             straight: truth.straight.mean / truth.entered.mean,
             lost: truth.lost,
-            all: relative(prediction.all, truth.scattered),
+            all: relative(prediction.all, truth.all),
             seen: Some(relative(mean(&prediction.bins), mean(&truth.bins))),
             l1: Some(Estimate { mean: wrong / all, error: (2.0 / PI).sqrt() * noise / all }),
         }

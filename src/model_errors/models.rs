@@ -1,8 +1,9 @@
 //! The renderer's models as functions of two sites.
 
 use super::scenes::Scene;
-use crate::curvature::{REACH, of_mesh};
+use crate::curvature::{REACH, balance, of_mesh};
 use crate::reference::boundary::{Side, diffuse_reflectance};
+use crate::reference::profile::table::Local;
 use crate::reference::profile::{self, Coefficients, Directional, Options, Profile, constant};
 use crate::reference::walk::Matter;
 use crate::reference::walk::mesh::Corners;
@@ -45,8 +46,7 @@ pub fn models(matter: &Matter, scene: Option<&Scene>) -> Vec<Named> {
         Some((name, transfer))
     };
     let mut all: Vec<Named> = Model::NAMES.iter().filter_map(transfer).collect();
-    let curvatures = scene.map_or(vec![0.0], |scene| curvatures(scene, 1.0 / (3.0 * matter.sigma_a).sqrt()));
-    all.push(("table on spheres", Box::new(Table::new(&coefficients, curvatures))));
+    all.push(("table on spheres", Box::new(Table::on(scene, &coefficients, 1.0 / (3.0 * matter.sigma_a).sqrt()))));
     all
 }
 
@@ -63,18 +63,6 @@ impl Transfer for Beam {
     }
 }
 
-/// 1 / radius of the locally alike sphere at each place.
-fn curvatures(scene: &Scene, diffuse: f64) -> Vec<f64> {
-    match &scene.figure {
-        super::Figure::Ball(ball) => vec![1.0 / ball.radius],
-        super::Figure::Mesh(mesh) => {
-            let corners: Vec<Corners> = (0..mesh.len()).map(|index| mesh.corners(index)).collect();
-            let found = of_mesh(&corners, REACH * diffuse, DIRECTIONS);
-            found.iter().map(|at| f64::from(at.element_sum()) / 3.0).collect()
-        }
-    }
-}
-
 /// The tabulated profile, by its kernels' twin.
 struct Table {
     material: shared::Material,
@@ -82,9 +70,32 @@ struct Table {
     strength: f64,
     /// 1 / radius at each place; empty for half-spaces.
     curvatures: Vec<f64>,
+    /// Balance at each place of a mesh.
+    balances: Vec<f64>,
 }
 
 impl Table {
+    /// The table with the locally alike spheres of a body.
+    fn on(scene: Option<&Scene>, matter: &Coefficients, diffuse: f64) -> Table {
+        let mesh = match scene.map(|scene| &scene.figure) {
+            None => return Table::new(matter, vec![0.0]),
+            Some(super::Figure::Ball(ball)) => return Table::new(matter, vec![1.0 / ball.radius]),
+            Some(super::Figure::Mesh(mesh)) => mesh,
+        };
+        let corners: Vec<Corners> = (0..mesh.len()).map(|index| mesh.corners(index)).collect();
+        let curvatures = of_mesh(&corners, REACH * diffuse, DIRECTIONS);
+        let means = curvatures.iter().map(|at| f64::from(at.element_sum()) / 3.0).collect();
+        let mut table = Table::new(matter, means);
+        let local = |curvature: f64| Local::new(table.matter(curvature));
+        let balances = balance::of_mesh(&corners, &curvatures, false, diffuse, local);
+        table.balances = balances.iter().map(|at| at.iter().map(|at| f64::from(at.x)).sum::<f64>() / 3.0).collect();
+        table
+    }
+
+    fn matter(&self, curvature: f64) -> profile::Matter<'_> {
+        profile::Matter { material: &self.material, tables: &self.numbers, curvature }
+    }
+
     fn new(matter: &Coefficients, curvatures: Vec<f64>) -> Table {
         let mut numbers = Vec::new();
         let options =
@@ -92,16 +103,16 @@ impl Table {
         let spheres: &[i32] = if curvatures.is_empty() { &[] } else { &SPHERES };
         let material = profile::tabulated(&[*matter; 3], options, spheres, &mut numbers);
         let strength = Profile::new(MODEL_TABLE, matter).strength();
-        Table { material, numbers, strength, curvatures }
+        Table { material, numbers, strength, curvatures, balances: vec![] }
     }
 }
 
 impl Transfer for Table {
     fn transfer(&self, from: &Site, travel: DVec3, to: &Site) -> f64 {
-        let curvature = self.curvatures.get(to.place).copied().unwrap_or(0.0);
-        let matter = profile::Matter { material: &self.material, tables: &self.numbers, curvature };
+        let matter = self.matter(self.curvatures.get(to.place).copied().unwrap_or(0.0));
+        let balance = self.balances.get(to.place).copied().unwrap_or(1.0);
         let cos = (-travel.dot(from.normal)).max(0.0);
         let shape = profile::shapes(matter, from.position.distance(to.position)).x;
-        self.strength * shape * profile::obliqueness(matter, cos, false).x
+        self.strength * balance * shape * profile::obliqueness(matter, cos, false).x
     }
 }

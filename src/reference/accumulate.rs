@@ -25,12 +25,14 @@ use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::pixel::position;
 use super::profile::{self, Directional, Matter, shapes, shapes_shifted};
-use super::projection::{Seen, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal};
+use super::projection::{
+    Seen, balance, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal,
+};
 use super::random::{batch, key, scramble, sobol, unit};
 use super::rough::crossing;
 use super::sample::coordinate;
 use super::sums::Contribution;
-use super::{Inputs, emitter, intersect, texture};
+use super::{Inputs, emitter, intersect, mixture, texture};
 use crate::shared::{
     BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, MISS,
     MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
@@ -105,17 +107,23 @@ pub fn accumulate(
         }
     };
     let point = surface.position.as_dvec3() + delta;
-    let entry = Entry::new(inputs, matter.material, seen.side, point, triangle);
+    let material = mixture::entered(inputs, matter.material, triangle);
+    let entry = Entry::new(inputs, material, seen.side, point, triangle);
+    let local = texture::medium(inputs, material, triangle, entry.weights);
+    let local = Matter { material: &local, ..matter };
     let leaving = entry.tint
         * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
         * crossing(inputs, matter.material, seen.shading_normal.dot(seen.wo))
-        * profile::obliqueness(matter, seen.shading_normal.dot(seen.wo), true);
+        * profile::obliqueness(local, seen.shading_normal.dot(seen.wo), true)
+        * balance(inputs, material, surface)
+        * if inputs.mixtures.is_empty() { DVec3::ONE } else { matter.material.exit.as_dvec3() };
     let given = inputs.features.projection == PROJECTION_CAMERA;
-    let exponent = if given { f64::from(matter.material.camera_rate) * f64::from(probe.radius) } else { 0.0 };
-    let local = texture::medium(inputs, matter.material, triangle, entry.weights);
-    let value = |wi: DVec3| match matter.material.model {
-        MODEL_DIRECTIONAL => directed(Matter { material: &local, ..matter }, &seen, delta, entry.shading, wi, exponent),
-        _ => profile::obliqueness(matter, entry.shading.dot(wi), false),
+    let members = mixture::members(inputs, matter.material, surface.triangle);
+    let rate = members.first().map_or(0.0, |member| f64::from(member.camera_rate));
+    let exponent = if given { rate * f64::from(probe.radius) } else { 0.0 };
+    let value = |wi: DVec3| match material.model {
+        MODEL_DIRECTIONAL => directed(local, &seen, delta, entry.shading, wi, exponent),
+        _ => profile::obliqueness(local, entry.shading.dot(wi), false),
     };
     Contribution::of(leaving * factor * entering_light(inputs, step, index, &entry, value))
 }
@@ -142,7 +150,8 @@ fn delta(probe: &Probe, hits: &Hits, j: usize) -> DVec3 {
     probe.offset.as_dvec3() + f64::from(hits.t[j]) * probe.direction.as_dvec3()
 }
 
-/// The hit that is lit, and its f / p including the weight of the choice; none if no hit weighs anything.
+/// The hit that is lit, and its f / p including the weight of the choice; none if no hit weighs anything. `matter` is that of
+/// the surface that is seen.
 pub fn choose(
     inputs: &Inputs,
     step: &Step,
@@ -158,25 +167,34 @@ pub fn choose(
     let normal = |j: usize| seen.side * geometric_normal(&inputs.triangles[hits.triangle[j] as usize]);
     // The matter as it is where hit j lets light in.
     let local = |j: usize| {
-        let shape = &inputs.triangles[hits.triangle[j] as usize];
+        let triangle = hits.triangle[j];
         let point = seen.position + delta(probe, hits, j);
-        texture::medium(inputs, matter.material, hits.triangle[j], barycentric(shape, point))
+        let weights = barycentric(&inputs.triangles[triangle as usize], point);
+        texture::medium(inputs, mixture::entered(inputs, matter.material, triangle), triangle, weights)
     };
+    let members = mixture::members(inputs, matter.material, hits.triangle[0]);
     if inputs.features.projection == PROJECTION_CAMERA {
         let local = local(0);
         let local = Matter { material: &local, ..matter };
-        return Some((0, given_factor(local, seen, probe, delta(probe, hits, 0), normal(0))));
+        let rate = f64::from(members[0].camera_rate);
+        return Some((0, given_factor(local, rate, seen, probe, delta(probe, hits, 0), normal(0))));
     }
     let stored = hits.count.min(MAX_HITS) as usize;
     let terms: Vec<(DVec3, f64)> = (0..stored)
         .map(|j| {
             let delta = delta(probe, hits, j);
-            let p = mixture_density(inputs.features.projection, matter, seen, delta, normal(j));
+            let density = |material| {
+                mixture_density(inputs.features.projection, Matter { material, ..matter }, seen, delta, normal(j))
+            };
+            let p = members.iter().map(density).sum::<f64>() / members.len() as f64;
             let local = local(j);
             let local = Matter { material: &local, ..matter };
-            let f = local.material.strength.as_dvec3() * shapes(local, delta.length());
+            // In the opaque limit light leaves nowhere else.
+            let limit = local.material.model == MODEL_LAMBERT;
+            let strength = if limit { DVec3::ZERO } else { local.material.strength.as_dvec3() };
+            let f = strength * shapes(local, delta.length());
             // The directional dipole's own value comes with each ray.
-            let value = if matter.material.model == MODEL_DIRECTIONAL { DVec3::ONE } else { f };
+            let value = if local.material.model == MODEL_DIRECTIONAL { DVec3::ONE } else { f };
             if p > 0.0 { (value / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
         })
         .collect();
@@ -194,12 +212,13 @@ pub fn choose(
 }
 
 /// f / p of the method as given.
-fn given_factor(matter: Matter, seen: &Seen, probe: &Probe, delta: DVec3, normal: DVec3) -> DVec3 {
-    let (r, rate) = (f64::from(probe.radius), f64::from(matter.material.camera_rate));
+fn given_factor(matter: Matter, rate: f64, seen: &Seen, probe: &Probe, delta: DVec3, normal: DVec3) -> DVec3 {
+    let r = f64::from(probe.radius);
     let d = probe.direction.as_dvec3();
     let jacobian = seen.normal.dot(d).abs() / normal.dot(d).abs() * inverse_scale(seen, delta).powi(2);
     let value = match matter.material.model {
         MODEL_DIRECTIONAL => DVec3::ONE,
+        MODEL_LAMBERT => DVec3::ZERO,
         _ => matter.material.strength.as_dvec3() * shapes_shifted(matter, delta.length(), rate * r),
     };
     value * (TAU * r / rate * jacobian)

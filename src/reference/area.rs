@@ -38,6 +38,15 @@ pub struct Matter {
     pub model: Model,
 }
 
+impl Matter {
+    /// Albedo, extinction and absorption of a channel, reduced.
+    fn coefficients(&self, c: usize) -> (f64, f64, f64) {
+        let Matter { sigma_s_prime, sigma_a, .. } = self;
+        let extinction = sigma_s_prime[c] + sigma_a[c];
+        (sigma_s_prime[c] / extinction, extinction, sigma_a[c])
+    }
+}
+
 /// A light.
 #[derive(Clone, Copy, Debug)]
 pub enum Lamp {
@@ -58,6 +67,9 @@ pub struct Setting<'a> {
     /// Other surfaces that cast shadows.
     pub blockers: &'a [Corners],
     pub matter: Matter,
+    /// Matter behind each triangle of the set, by whose profile its light travels; none where it is `matter` everywhere.
+    /// Index of refraction and normalisation are those of `matter`.
+    pub entries: &'a [Matter],
     pub lamps: &'a [Lamp],
     /// Radiance from every direction.
     pub surrounding: DVec3,
@@ -81,8 +93,9 @@ pub fn leaving(setting: &Setting, point: DVec3, normal: DVec3, wo: DVec3, sample
     let surface = Surface::new(setting);
     let exit = 1.0 - reflectance(setting.matter.ior, normal.dot(wo));
     let moments = moments(samples, seed, |rng| {
-        let (x, n) = surface.sample(rng);
-        let profile = |wi: DVec3| surface.profile(point - x, n, wi, normal);
+        let (x, n, index) = surface.sample(rng);
+        let matter = setting.entries.get(index).unwrap_or(&setting.matter);
+        let profile = |wi: DVec3| surface.profile(matter, point - x, n, wi, normal);
         exit * surface.area * surface.entering(x, n, rng, profile)
     });
     moments.estimate()
@@ -92,7 +105,7 @@ pub fn leaving(setting: &Setting, point: DVec3, normal: DVec3, wo: DVec3, sample
 pub fn entering_flux(setting: &Setting, samples: u64, seed: u64) -> Estimate {
     let surface = Surface::new(setting);
     let sample = |rng: &mut Random| {
-        let (x, n) = surface.sample(rng);
+        let (x, n, _) = surface.sample(rng);
         surface.area * surface.entering(x, n, rng, |_| DVec3::ONE)
     };
     moments(samples, seed, sample).estimate()
@@ -207,30 +220,23 @@ impl<'a> Surface<'a> {
 
     /// S without the Fresnel factors, of light from `wi` that enters with the normal `ni` and leaves at the distance `x`
     /// from there with the normal `no`.
-    fn profile(&self, x: DVec3, ni: DVec3, wi: DVec3, no: DVec3) -> DVec3 {
+    fn profile(&self, matter: &Matter, x: DVec3, ni: DVec3, wi: DVec3, no: DVec3) -> DVec3 {
         DVec3::from([0, 1, 2].map(|c| {
-            if self.setting.matter.sigma_s_prime[c] == 0.0 {
+            if matter.sigma_s_prime[c] == 0.0 {
                 return 0.0;
             }
-            match self.setting.matter.model {
-                Model::Better => self.scale * self.better(c, x.length()),
-                Model::Burley => self.scale * self.burley(c, x.length()),
-                Model::Directional => self.scale * self.directional(c, x, ni, wi, no),
-                _ => self.scale * self.standard(c, x.length()),
+            let coefficients = matter.coefficients(c);
+            match matter.model {
+                Model::Better => self.scale * self.better(coefficients, x.length()),
+                Model::Burley => self.scale * self.burley(coefficients, x.length()),
+                Model::Directional => self.scale * self.directional(coefficients, matter.g, x, ni, wi, no),
+                _ => self.scale * self.standard(coefficients, x.length()),
             }
         }))
     }
 
-    /// Albedo, extinction and absorption of a channel, reduced.
-    fn coefficients(&self, c: usize) -> (f64, f64, f64) {
-        let Matter { sigma_s_prime, sigma_a, .. } = self.setting.matter;
-        let extinction = sigma_s_prime[c] + sigma_a[c];
-        (sigma_s_prime[c] / extinction, extinction, sigma_a[c])
-    }
-
     /// Jensen et al. 2001.
-    fn standard(&self, c: usize, r: f64) -> f64 {
-        let (albedo, extinction, absorption) = self.coefficients(c);
+    fn standard(&self, (albedo, extinction, absorption): (f64, f64, f64), r: f64) -> f64 {
         let diffusion = 1.0 / (3.0 * extinction);
         let sigma = (absorption / diffusion).sqrt();
         let depth = 1.0 / extinction;
@@ -250,8 +256,7 @@ impl<'a> Surface<'a> {
     }
 
     /// d'Eon 2012, with a signed height as there.
-    fn better(&self, c: usize, r: f64) -> f64 {
-        let (albedo, extinction, absorption) = self.coefficients(c);
+    fn better(&self, (albedo, extinction, absorption): (f64, f64, f64), r: f64) -> f64 {
         let (c_phi, c_e, a) = self.boundary();
         let diffusion = (extinction + absorption) / (3.0 * extinction * extinction);
         let sigma = (absorption / diffusion).sqrt();
@@ -265,8 +270,7 @@ impl<'a> Surface<'a> {
 
     /// Christensen and Burley 2015 with the standard dipole's total (Jensen and Buhler 2002) and the diffuse mean free
     /// path.
-    fn burley(&self, c: usize, r: f64) -> f64 {
-        let (albedo, extinction, absorption) = self.coefficients(c);
+    fn burley(&self, (albedo, extinction, absorption): (f64, f64, f64), r: f64) -> f64 {
         let inside = 2.0 * self.moments[0];
         let e = (3.0 * (1.0 - albedo)).sqrt();
         let total = albedo / 2.0 * (1.0 + (-4.0 / 3.0 * (1.0 + inside) / (1.0 - inside) * e).exp()) * (-e).exp();
@@ -277,8 +281,15 @@ impl<'a> Surface<'a> {
     }
 
     /// Frisvad et al. 2014, times pi (1 - rho_e) like a radial profile; the real source kept at 1 / (3 sigma_t).
-    fn directional(&self, c: usize, x: DVec3, ni: DVec3, wi: DVec3, no: DVec3) -> f64 {
-        let (albedo, extinction, absorption) = self.coefficients(c);
+    fn directional(
+        &self,
+        (albedo, extinction, absorption): (f64, f64, f64),
+        g: f64,
+        x: DVec3,
+        ni: DVec3,
+        wi: DVec3,
+        no: DVec3,
+    ) -> f64 {
         let (c_phi, c_e, a) = self.boundary();
         let diffusion = 1.0 / (3.0 * extinction);
         let sigma = (absorption / diffusion).sqrt();
@@ -294,7 +305,7 @@ impl<'a> Surface<'a> {
             let second = c_e * (3.0 * diffusion * (1.0 + sd) * w.dot(no) - inner * x.dot(no));
             (-sd).exp() / d.powi(3) * (first - second)
         };
-        let unreduced = self.setting.matter.sigma_s_prime[c] / (1.0 - self.setting.matter.g) + absorption;
+        let unreduced = albedo * extinction / (1.0 - g) + absorption;
         let least = 1.0 / (3.0 * unreduced).powi(2);
         let mu = -no.dot(w);
         let beta = -((r * r - x.dot(w).powi(2)).max(0.0) / (r * r + extrapolated * extrapolated)).sqrt();
@@ -307,13 +318,13 @@ impl<'a> Surface<'a> {
         (term(x, w, near) - term(place, mirrored, place.length())).max(0.0) / (4.0 * PI)
     }
 
-    /// A point uniform over the area, and the normal there.
-    fn sample(&self, rng: &mut Random) -> (DVec3, DVec3) {
+    /// A point uniform over the area, the normal there, and its triangle.
+    fn sample(&self, rng: &mut Random) -> (DVec3, DVec3, usize) {
         let pick = rng.next() * self.area;
         let index = self.areas.partition_point(|&sum| sum <= pick).min(self.areas.len() - 1);
         let [a, b, c] = self.setting.set[index];
         let (s, t) = inside(rng);
-        (a + (b - a) * s + (c - a) * t, (b - a).cross(c - a).normalize())
+        (a + (b - a) * s + (c - a) * t, (b - a).cross(c - a).normalize(), index)
     }
 
     /// Irradiance at `x` that passes the surface, each direction times `weight`; the surrounding by one cosine-weighted

@@ -13,6 +13,7 @@ pub mod emitter;
 pub mod intersect;
 pub mod light;
 pub mod math;
+pub mod mixture;
 pub mod pixel;
 pub mod primary;
 pub mod profile;
@@ -29,8 +30,8 @@ pub mod texture;
 pub mod walk;
 
 use crate::shared::{
-    BATCHES, Coordinates, Emitter, Features, Light, Material, Pixel, Shading, Step, Sums, Surface, Texture, Triangle,
-    View,
+    BATCHES, Balance, Coordinates, Emitter, Features, Light, Material, Mixture, Pixel, Shading, Step, Sums, Surface,
+    Texture, Triangle, View,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -63,6 +64,10 @@ pub struct Inputs<'a> {
     pub profiles: &'a [f32],
     /// Curvatures at the vertices of each triangle; empty where no profile depends on them.
     pub thickness: &'a [Vec3],
+    /// Balances of profiles and triangles; as many as curvatures, or several times that.
+    pub balances: &'a [Balance],
+    /// Media of each set; empty where none holds several materials.
+    pub mixtures: &'a [Mixture],
 }
 
 /// The step of one sample that traces all its rays in one dispatch.

@@ -27,7 +27,7 @@ use super::Inputs;
 use super::math::basis;
 use super::profile::{Matter, plane_density};
 use super::texture;
-use crate::shared::{Material, PROJECTION_CAMERA, PROJECTION_NORMAL, Surface, Triangle};
+use crate::shared::{MODEL_TABLE, Material, PROJECTION_CAMERA, PROJECTION_NORMAL, Surface, Triangle};
 use glam::DVec3;
 
 /// The techniques, in the order in which they are chosen.
@@ -114,6 +114,16 @@ pub fn curvature(inputs: &Inputs, surface: &Surface) -> f64 {
     let Some(curvatures) = inputs.thickness.get(surface.triangle as usize) else { return 0.0 };
     let [b1, b2] = surface.barycentric.as_dvec2().to_array();
     curvatures.as_dvec3().dot(DVec3::new(1.0 - b1 - b2, b1, b2))
+}
+
+/// The factor on the profile of a material at the surface that is seen; 1 where profiles do not depend on the curvature.
+pub fn balance(inputs: &Inputs, material: &Material, surface: &Surface) -> DVec3 {
+    if material.model != MODEL_TABLE || inputs.balances.is_empty() {
+        return DVec3::ONE;
+    }
+    let [a, b, c] = inputs.balances[(material.balance + surface.triangle) as usize].at.map(|at| at.as_dvec3());
+    let [b1, b2] = surface.barycentric.as_dvec2().to_array();
+    a * (1.0 - b1 - b2) + b * b1 + c * b2
 }
 
 /// The material, with what its profile reads.

@@ -1,15 +1,15 @@
 //! Draws the probe ray of a sample: radius, angle, channel and technique. Twin of `sample.comp`.
 //!
-//! `mis` and `normal` draw the radius from the profile itself ([`draw_radius`]), so
-//! that on a plane every sample has the same weight, and look for surfaces in the ball of radius `radius_max`: the same
+//! `mis` and `normal` draw the radius from the profile itself ([`draw_radius`]; of a set of several materials, from one of
+//! its [media](super::mixture)), so that on a plane every sample has the same weight, and look for surfaces in the ball of radius `radius_max`: the same
 //! region for every technique, as the balance heuristic requires. `camera` draws it from
 //! sigma e^(-sigma r) / (2 pi r) with the one rate `camera_rate`, and follows the camera ray from the eye.
 
-use super::Inputs;
 use super::pixel::position;
-use super::profile::{self, draw_radius};
+use super::profile::{self, Matter, draw_radius};
 use super::projection::{CAMERA, fractions, matter_at, seen};
 use super::random::{batch, key, scramble, unit};
+use super::{Inputs, mixture};
 use crate::shared::{
     DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, PROJECTION_CAMERA, Probe, Step, Surface, TRANSLUCENT,
 };
@@ -35,12 +35,13 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
         return NONE;
     }
     let matter = matter_at(inputs, surface);
-    let material = matter.material;
-    if material.flags & TRANSLUCENT == 0 || material.component_cdf[8] == 0.0 {
+    let members = mixture::members(inputs, matter.material, surface.triangle);
+    if matter.material.flags & TRANSLUCENT == 0 || members.is_empty() {
         return NONE;
     }
     let seen = seen(inputs, surface);
     let u = |dimension| coordinate(inputs, step, index, dimension);
+    let (material, u_component) = mixture::pick(&members, u(DIM_COMPONENT));
     let given = inputs.features.projection == PROJECTION_CAMERA;
 
     let fractions = fractions(inputs.features.projection, seen.normal.dot(seen.wo));
@@ -49,7 +50,7 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
     let r = if given {
         -(-u(DIM_RADIUS)).ln_1p() / f64::from(material.camera_rate)
     } else {
-        draw_radius(matter, u(DIM_COMPONENT), u(DIM_RADIUS))
+        draw_radius(Matter { material, ..matter }, u_component, u(DIM_RADIUS))
     };
 
     let [n, tangent, bitangent] = seen.axes;

@@ -27,8 +27,9 @@
 //! matter is then s_i c / c', if s_i is that along the straight line (Jensen et al.), while w'i in the phase function is
 //! refracted as at a smooth surface, whatever its roughness. That is exact on a plane in parallel light, and on every surface at n = 1; elsewhere an approximation, which
 //! has no caustics. The irradiance E is that at P without the surface. Fresnel, cosines and refraction take the shading
-//! normal, at xo the geometric one if else the ray would not enter. P and the way to it are of the matter at xo; a set
-//! ends at its own surfaces, whichever way they are wound; other objects block light outside.
+//! normal, at xo the geometric one if else the ray would not enter. P and the way to it are of the matter at xo, also in a
+//! set of several materials, where only the boundary is that of xi; a set ends at its own surfaces, whichever way they are
+//! wound; other objects block light outside.
 //!
 //! # Estimator
 //! s has the density of the mean over channels that scatter of sigma_t e^(-sigma_t s) / (1 - e^(-sigma_t T)) (balance
@@ -50,7 +51,7 @@ use super::projection::{geometric_normal, material, seen, shading_normal};
 use super::random::{batch, key, scramble, unit};
 use super::rough::crossing;
 use super::sums::Contribution;
-use super::{Inputs, emitter, intersect};
+use super::{Inputs, emitter, intersect, mixture};
 use crate::shared::{
     DIM_SINGLE, DIM_SINGLE_EMITTER, DIM_SINGLE_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, MISS, Material, SHADOW_OFFSET,
     Step, Surface, Triangle,
@@ -211,7 +212,7 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
         let cos_inside = inner.dot(shading);
         let along =
             if hit.triangle == surface.triangle { -depth * d.dot(outward) / wi.dot(outward) } else { hit.t.max(0.0) };
-        let flux = crossing(inputs, material, c) * c / cos_inside / (ior * ior);
+        let flux = crossing(inputs, mixture::entered(inputs, material, hit.triangle), c) * c / cos_inside / (ior * ior);
         let channel = |i: usize| {
             // sigma_s p e^(-sigma_t (depth + way)) over the density of the depth, all exponents together.
             let density = |k: usize| {

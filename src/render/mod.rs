@@ -469,6 +469,8 @@ fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u
         (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
         (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
         (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
+        (Slot::Balances, bytemuck::cast_slice(&prepared.balances)),
+        (Slot::Mixtures, bytemuck::cast_slice(&prepared.mixtures)),
     ]
     .into_iter()
     .filter(|(_, data)| !data.is_empty())

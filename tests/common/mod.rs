@@ -32,6 +32,8 @@ pub struct World {
     pub coordinates: Vec<Coordinates>,
     pub profiles: Vec<f32>,
     pub thickness: Vec<Vec3>,
+    pub balances: Vec<Balance>,
+    pub mixtures: Vec<Mixture>,
 }
 
 impl World {
@@ -77,6 +79,8 @@ impl World {
             coordinates: &self.coordinates,
             profiles: &self.profiles,
             thickness: &self.thickness,
+            balances: &self.balances,
+            mixtures: &self.mixtures,
         }
     }
 

@@ -185,6 +185,7 @@ fn near_emitters_agree_with_the_integrator() {
         let setting = Setting {
             set: &set,
             blockers: &blockers,
+            entries: &[],
             matter: Matter {
                 sigma_s_prime: sigma_s.into(),
                 sigma_a: sigma_a.into(),

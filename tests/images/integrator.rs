@@ -67,6 +67,7 @@ impl Experiment {
         let setting = Setting {
             set: &set,
             blockers: &blockers,
+            entries: &[],
             matter: Matter {
                 sigma_s_prime: SIGMA_S_PRIME.into(),
                 sigma_a: SIGMA_A.into(),

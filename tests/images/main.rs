@@ -11,6 +11,7 @@ mod integrator;
 mod lambert;
 mod lights;
 mod measure;
+mod mixtures;
 mod repeatable;
 mod scenes;
 mod statistics;

@@ -57,7 +57,7 @@ pub fn bench() -> MutexGuard<'static, Bench> {
 impl Bench {
     /// What kernels read of `inputs`, and `buffers`, on the device.
     pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Loaded {
-        let fixed: [(Slot, &[u8]); 15] = [
+        let fixed: [(Slot, &[u8]); 19] = [
             (Slot::Views, bytemuck::bytes_of(inputs.view)),
             (Slot::Nodes, bytemuck::cast_slice(nodes)),
             (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
@@ -73,6 +73,10 @@ impl Bench {
             (Slot::Texels, bytemuck::cast_slice(inputs.texels)),
             (Slot::Textures, bytemuck::cast_slice(inputs.textures)),
             (Slot::Coordinates, bytemuck::cast_slice(inputs.coordinates)),
+            (Slot::Profiles, bytemuck::cast_slice(inputs.profiles)),
+            (Slot::Thickness, bytemuck::cast_slice(inputs.thickness)),
+            (Slot::Balances, bytemuck::cast_slice(inputs.balances)),
+            (Slot::Mixtures, bytemuck::cast_slice(inputs.mixtures)),
         ];
         let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
         let make = |(slot, data): (Slot, &[u8])| {

@@ -72,6 +72,8 @@ fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
         coordinates: &[],
         profiles: &[],
         thickness: &[],
+        balances: &[],
+        mixtures: &[],
     };
     let mut bench = bench();
     bench.add("math", &compile(KERNEL), &inputs.features);

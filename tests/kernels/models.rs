@@ -115,6 +115,8 @@ impl Sweep {
             emitter_cdf: &[],
             boundaries: &[],
             thickness: &[],
+            balances: &[],
+            mixtures: &[],
         };
         let mut bench = bench();
         bench.add("models", &compile(KERNEL), &inputs.features);

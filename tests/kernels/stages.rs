@@ -112,7 +112,37 @@ fn cases() -> Vec<(String, Case)> {
         };
         cases.push((format!("{model}, {projection:?}"), Case::new(scene, &settings)));
     }
+    for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
+        let single_scattering = SingleScattering::On;
+        let (resolution, crop) = (Some(FULL), Some(CROP));
+        let settings = Settings { resolution, crop, projection, seed: 6, single_scattering, ..Settings::default() };
+        cases.push((format!("{projection:?}, three media"), Case::new(mixed(&demo), &settings)));
+    }
     cases
+}
+
+/// The animal of three media in one set, under three models, of which one is rough.
+fn mixed(demo: &Scene) -> Scene {
+    let mut scene = demo.clone();
+    let translucent = |material: &usize| demo.materials[*material].medium.is_some();
+    let animal = demo.sets.iter().position(|set| set.materials.iter().all(translucent)).expect("a translucent set");
+    let mut materials = vec![demo.sets[animal].materials[0]];
+    for (model, factor, roughness) in [(Model::Burley, 4.0, 0.0), (Model::Directional, 0.5, 0.7)] {
+        let mut material = demo.materials[materials[0]].clone();
+        let medium = material.medium.as_mut().expect("it is translucent");
+        medium.model = Some(model);
+        medium.sigma_s_prime *= factor;
+        medium.sigma_a /= factor;
+        material.roughness = roughness;
+        materials.push(scene.materials.len());
+        scene.materials.push(material);
+    }
+    let of_animal = scene.triangles.iter().zip(&mut scene.shadings).filter(|(t, _)| t.set as usize == animal);
+    for (index, (_, shading)) in of_animal.enumerate() {
+        shading.material = materials[index % 3] as u32;
+    }
+    scene.sets[animal].materials = materials;
+    scene
 }
 
 /// What the twins give for one sample of every pixel.

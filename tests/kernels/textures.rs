@@ -66,6 +66,8 @@ fn lookup_is_the_twins() {
         coordinates: &[],
         profiles: &[],
         thickness: &[],
+        balances: &[],
+        mixtures: &[],
     };
     let points: Vec<Vec3> = (0..1u32 << 14)
         .map(|i| {

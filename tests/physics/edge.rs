@@ -22,7 +22,7 @@ fn medium(sigma_tr: f64, albedo: f64, ior: f64, normalisation: Normalisation) ->
 }
 
 fn setting<'a>(set: &'a [Corners], matter: Matter, lamps: &'a [Lamp], surrounding: f64) -> Setting<'a> {
-    Setting { set, blockers: &[], matter, lamps, surrounding: DVec3::splat(surrounding) }
+    Setting { set, blockers: &[], entries: &[], matter, lamps, surrounding: DVec3::splat(surrounding) }
 }
 
 /// Fails if an area estimate is more than 4 standard errors (once in 16,000) and `slack` of the value away.

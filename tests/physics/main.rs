@@ -1,5 +1,6 @@
 //! The twins against truths that they do not contain: closed forms, quadrature, an independent integrator. No GPU.
 
+mod balance;
 mod boundary;
 #[path = "../common/mod.rs"]
 mod common;

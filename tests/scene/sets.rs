@@ -4,7 +4,7 @@ use crate::build::{Numbers, metres, same_triangles, volume};
 use crate::scenes::{Eye, Mesh, gltf, matter, scene};
 use glam::DVec3;
 use serde_json::{Value, json};
-use translucent::{Scene, scene::LoadOptions};
+use translucent::{Scene, Settings, prepare::prepare, scene::LoadOptions};
 
 const EYE: Eye = Eye { eye: DVec3::new(0.0, 0.0, 9.0), at: DVec3::ZERO, lens: 0.5 };
 
@@ -257,4 +257,27 @@ fn bad_meshes_are_told() {
     let told = "translucent triangles on surfaces with only one side, where no winding says where the matter is: 24";
     assert!(strip.warnings.contains(&told.to_string()), "{:?}", strip.warnings);
     assert_eq!(strip.sets[0].open_edges, 24);
+}
+
+#[test]
+fn a_set_has_a_limited_number_of_media() {
+    let sphere = Mesh::sphere(1.0, 6);
+    let media = |count: usize, distinct: usize| {
+        let material = |i: usize| {
+            let mut material = matter([2.0 + (i % distinct) as f64; 3], [0.1; 3], 1.4);
+            material["extras"]["bssrdf"]["set"] = json!("body");
+            material
+        };
+        let parts: Vec<Mesh> = (0..count).map(|i| part(&sphere, 8 * i..8 * i + 8)).collect();
+        scene(&file(&parts, &(0..count).map(material).collect::<Vec<_>>()))
+    };
+    let settings = Settings { resolution: Some((4, 4)), ..Settings::default() };
+    for (count, distinct) in [(8, 8), (12, 3)] {
+        let prepared = prepare(&media(count, distinct), &settings).expect("not too many");
+        assert_eq!((prepared.mixtures.len(), prepared.mixtures[0].count as usize), (1, distinct));
+    }
+    let error = prepare(&media(9, 9), &settings).expect_err("one too many").to_string();
+    assert!(error.contains("set `body`") && error.contains("holds 9 media"), "{error}");
+    // One material needs none.
+    assert!(prepare(&load(&[sphere]), &settings).expect("valid").mixtures.is_empty());
 }

@@ -77,6 +77,10 @@ impl Column<'_> {
         low + t * (high - low)
     }
 
+    fn total(&self) -> f64 {
+        f64::from(self.within[self.reached])
+    }
+
     /// Light within the squared distance.
     fn inside(&self, s: f64) -> f64 {
         let cell = grid::cell(s as f32);
@@ -85,7 +89,7 @@ impl Column<'_> {
         }
         let i = (cell - self.first) as usize;
         if i >= self.reached {
-            return f64::from(self.within[self.reached]);
+            return self.total();
         }
         let low = f64::from(grid::node(cell));
         f64::from(self.within[i]) + PI * (s - low) * (f64::from(self.values[i]) + self.value(s)) / 2.0
@@ -136,9 +140,8 @@ struct Part {
 }
 
 impl Part {
-    /// Squared distance in the node's table, and the factor on areas there; nothing lies beyond the diameter.
-    fn bent(&self, r: f64) -> (f64, f64) {
-        let s = r * r;
+    /// The squared distance s in the node's table, and the factor on areas there; nothing lies beyond the diameter.
+    fn bent(&self, s: f64) -> (f64, f64) {
         if self.bend == 0.0 {
             return (s, 1.0);
         }
@@ -154,7 +157,7 @@ impl Part {
 
     /// Values of the channels at the distance r, weighted.
     fn values(&self, matter: Matter, r: f64) -> DVec3 {
-        let (s, area) = self.bent(r);
+        let (s, area) = self.bent(r * r);
         self.weight * area * Node::of(matter, self.node).values(s)
     }
 }
@@ -213,6 +216,58 @@ pub(super) fn obliqueness(material: &Material, slope: DVec3, cos: f64, leaving: 
     let inside = (1.0 - (1.0 - cos * cos) / (n * n)).max(0.0).sqrt();
     let factor = DVec3::ONE + slope * (1.0 - inside);
     if leaving { factor / (DVec3::ONE + slope * f64::from(material.obliqueness)) } else { factor }
+}
+
+/// The profile of a material at one curvature, over its strength.
+pub struct Local<'a> {
+    parts: Vec<(Part, [Column<'a>; 3])>,
+}
+
+impl<'a> Local<'a> {
+    pub fn new(matter: Matter<'a>) -> Local<'a> {
+        let of = |part: Part| {
+            let columns = [0, 1, 2].map(|c| Node::of(matter, part.node).column(c));
+            (part, columns)
+        };
+        Local { parts: parts(matter).into_iter().map(of).collect() }
+    }
+
+    fn sum(&self, f: impl Fn(&Part, &Column) -> f64) -> DVec3 {
+        let of = |(part, columns): &(Part, [Column; 3])| {
+            part.weight * DVec3::from(columns.each_ref().map(|column| f(part, column)))
+        };
+        self.parts.iter().map(of).sum()
+    }
+
+    /// Value at the squared distance.
+    pub fn value(&self, squared: f64) -> DVec3 {
+        self.sum(|part, column| {
+            let (s, area) = part.bent(squared);
+            area * column.value(s)
+        })
+    }
+
+    /// Light within the squared distance.
+    pub fn inside(&self, squared: f64) -> DVec3 {
+        self.sum(|part, column| {
+            let (s, area) = part.bent(squared);
+            if area > 0.0 { column.inside(s) } else { column.total() }
+        })
+    }
+
+    /// All light.
+    pub fn total(&self) -> DVec3 {
+        self.sum(|_, column| column.total())
+    }
+
+    /// Distance beyond which there is nothing.
+    pub fn end(&self) -> f64 {
+        let of = |(part, columns): &(Part, [Column; 3])| {
+            let reached = f64::from(grid::node(columns[0].first + columns[0].reached as u32)).sqrt();
+            if part.bend == 0.0 { reached } else { part.scale.sqrt().recip() }
+        };
+        self.parts.iter().map(of).fold(0.0, f64::max)
+    }
 }
 
 impl Tabulated {

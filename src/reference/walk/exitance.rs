@@ -36,8 +36,10 @@ pub struct Bins<'a> {
 /// Flux [irradiance x area], by sigma_a.
 #[derive(Clone, Debug)]
 pub struct Exitance {
-    /// Flux of scattered light that leaves each bin; over the bin's area it is the mean exitance.
+    /// Flux that leaves each bin, scattered or not; over the bin's area it is the mean exitance.
     pub bins: Vec<Estimate>,
+    /// All that left.
+    pub all: Estimate,
     /// All that was scattered and left.
     pub scattered: Estimate,
     /// What passed through without being scattered.
@@ -64,7 +66,7 @@ pub fn exitance(
     let least = absorptions.iter().copied().fold(f64::INFINITY, f64::min);
     let matter = Matter { sigma_a: least, ..matter };
     let Bins { count, of } = bins;
-    let stride = count + 2;
+    let stride = count + 3;
     let all = stride * absorptions.len();
     let tally = Tally::run(all + 1, paths, seed, |random, tally| {
         let Some((site, _, inside)) = enter(body, matter.ior, light, random) else { return };
@@ -79,19 +81,17 @@ pub fn exitance(
         };
         for (row, &sigma_a) in absorptions.iter().enumerate() {
             let weight = exit.weight(sigma_a);
-            if exit.scatterings == 0 {
-                tally.add(row * stride + count + 1, weight);
-            } else {
-                tally.add(row * stride + count, weight);
-                tally.add(row * stride + of(exit.position, exit.place), weight);
-            }
+            tally.add(row * stride + of(exit.position, exit.place), weight);
+            tally.add(row * stride + count, weight);
+            tally.add(row * stride + count + if exit.scatterings == 0 { 2 } else { 1 }, weight);
         }
     });
     let flux = light.flux(body);
     let result = |row: usize| Exitance {
         bins: (0..count).map(|bin| tally.estimate(row * stride + bin).scaled(flux)).collect(),
-        scattered: tally.estimate(row * stride + count).scaled(flux),
-        straight: tally.estimate(row * stride + count + 1).scaled(flux),
+        all: tally.estimate(row * stride + count).scaled(flux),
+        scattered: tally.estimate(row * stride + count + 1).scaled(flux),
+        straight: tally.estimate(row * stride + count + 2).scaled(flux),
         entered: tally.estimate(all).scaled(flux),
         lost: tally.lost as f64 / paths as f64,
     };
