@@ -385,6 +385,9 @@ pub(crate) fn replaced(
     if choice.as_ref().is_some_and(|choice| choice.limit_of == Model::Table) {
         return refuse("the table model's profile is simulated for its matter; another needs a new renderer");
     }
+    if translucent && prepared.features.mixtures != 0 {
+        return refuse("another medium where sets hold several materials needs a new renderer");
+    }
     let same_boundary = old.roughness == new.roughness && (old.ior == new.ior || old.roughness == 0.0);
     if translucent && !same_boundary || (old.roughness > 0.0) != (new.roughness > 0.0) {
         return refuse("another rough boundary needs a new renderer");

@@ -1,7 +1,7 @@
 //! The renderer's models as functions of two sites.
 
 use super::scenes::Scene;
-use crate::curvature::{REACH, balance, of_mesh};
+use crate::curvature::{balance, of_mesh, reach};
 use crate::reference::boundary::{Side, diffuse_reflectance};
 use crate::reference::profile::table::Local;
 use crate::reference::profile::{self, Coefficients, Directional, Options, Profile, constant};
@@ -75,7 +75,7 @@ struct Table {
 }
 
 impl Table {
-    /// The table with the locally alike spheres of a body.
+    /// The table with the locally alike spheres of a body; lengths are in reduced mean free paths.
     fn on(scene: Option<&Scene>, matter: &Coefficients, diffuse: f64) -> Table {
         let mesh = match scene.map(|scene| &scene.figure) {
             None => return Table::new(matter, vec![0.0]),
@@ -83,7 +83,7 @@ impl Table {
             Some(super::Figure::Mesh(mesh)) => mesh,
         };
         let corners: Vec<Corners> = (0..mesh.len()).map(|index| mesh.corners(index)).collect();
-        let curvatures = of_mesh(&corners, REACH * diffuse, DIRECTIONS);
+        let curvatures = of_mesh(&corners, reach(diffuse, 1.0), DIRECTIONS);
         let means = curvatures.iter().map(|at| f64::from(at.element_sum()) / 3.0).collect();
         let mut table = Table::new(matter, means);
         let local = |curvature: f64| Local::new(table.matter(curvature));

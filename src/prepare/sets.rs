@@ -66,7 +66,7 @@ pub(super) fn thickness(scene: &Scene, settings: &Settings, advice: &[Option<Adv
     // Where a set holds several media, the first one's light says how far to look around.
     let length = |set: &Set| {
         let medium = scene.materials[set.materials.iter().copied().find(tabulated)?].medium.as_ref()?;
-        Some(curvature::REACH * diffuse_mean_free_path(medium) * scene.frame.scale)
+        Some(curvature::reach(diffuse_mean_free_path(medium), reduced_mean_free_path(medium)) * scene.frame.scale)
     };
     let lengths: Vec<Option<f64>> = scene.sets.iter().map(length).collect();
     let wanted = settings.curvature && lengths.iter().any(Option::is_some);
@@ -116,10 +116,22 @@ pub(super) fn balances(
 
 /// 1 / sigma_tr (m), the geometric mean of the channels that scatter and absorb; infinite where none does.
 fn diffuse_mean_free_path(medium: &Medium) -> f64 {
-    let rates = [0, 1, 2].map(|c| {
+    mean_length([0, 1, 2].map(|c| {
         let (scattering, absorption) = (medium.sigma_s_prime[c], medium.sigma_a[c]);
         if scattering > 0.0 { (3.0 * absorption * (scattering + absorption)).sqrt() } else { 0.0 }
-    });
+    }))
+}
+
+/// 1 / sigma_t' (m), the geometric mean of the channels that scatter; infinite where none does.
+fn reduced_mean_free_path(medium: &Medium) -> f64 {
+    mean_length([0, 1, 2].map(|c| {
+        let (scattering, absorption) = (medium.sigma_s_prime[c], medium.sigma_a[c]);
+        if scattering > 0.0 { scattering + absorption } else { 0.0 }
+    }))
+}
+
+/// 1 over the geometric mean of the rates that are not 0.
+fn mean_length(rates: [f64; 3]) -> f64 {
     let logarithms: Vec<f64> = rates.into_iter().filter(|&rate| rate > 0.0).map(f64::ln).collect();
     if logarithms.is_empty() {
         return f64::INFINITY;

@@ -52,9 +52,9 @@ impl Renderer {
     /// model stays as it was chosen.
     ///
     /// # Errors
-    /// [`Error::Setting`] for an index that the scene does not have, for numbers out of range, and where the renderer
-    /// was made for something else: opaque matter for translucent, other textures, emission or sets, another roughness
-    /// of translucent matter, the table model, single scattering where there was none.
+    /// [`Error::Setting`] for an index that the scene does not have, for numbers out of range, and where the renderer was
+    /// made for something else: opaque matter for translucent, other textures, emission or sets, another roughness of
+    /// translucent matter, the table model, sets of several materials, single scattering where there was none.
     pub fn set_material(&mut self, index: usize, material: &scene::Material) -> Result<()> {
         let Some(old) = self.authored.get(index) else {
             let problem = format!("there are {}, none has the index {index}", self.authored.len());
