@@ -31,7 +31,7 @@
 //!    geometry centred and   internal  Lights Environment EnvironmentCdf ─────► buffers   per scene
 //!    scaled)                units)    Emitters EmitterCdf Boundaries
 //!                                     Texels Textures Coordinates
-//!                                     Profiles Thickness
+//!                                     Profiles Thickness Balances Mixtures
 //!                                     View ──────────────────────────────────► buffer    per render
 //!
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
@@ -66,7 +66,7 @@
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
-//! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like |
+//! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like, and how much of its light the body gives back |
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |

@@ -6,7 +6,9 @@
 //!   balance(x) = T(a) / int_body R_a(|x' - x|) dA',
 //!
 //! for each channel, the profile that is used at x has the total of the sphere: even light on all of the body comes out
-//! everywhere as on the sphere, and as bright as it went in where nothing is absorbed. It is 1 on spheres and on planes.
+//! everywhere as on the sphere, and as bright as it went in where nothing is absorbed. It is 1 on spheres and on planes; on
+//! those of less than a mean free path whose facets cut off the end of the diameter, where the light leaves that crosses
+//! them straight, it is above.
 //! On an open surface light that leaves over the border is in the matter behind: there it is at most 1.
 //!
 //! # The integral
@@ -19,7 +21,7 @@
 //! that are small beside their distance count with R at their centre (J. Barnes, P. Hut, Nature 324 (1986)): a group of
 //! the radius s at the distance d is opened unless s (1 + d / 2 L) < [`OPENING`] d, L the diffuse mean free path. Since R
 //! falls at most about as d^-3 e^(-d/L), a group errs by (3 s / d)^2 / 16 at most; the whole integral by less than .5 %, and
-//! by up to 4 % where the ring at a small sphere's diameter, which holds the light that crosses it straight, ends on the
+//! by up to 5 % where the ring at a small sphere's diameter, which holds the light that crosses it straight, ends on the
 //! body (tests/physics/balance.rs).
 
 use super::Vertices;

@@ -101,7 +101,7 @@ fn body_of_two_media_against_the_integrator() {
             let [a, b, c] = *corners.iter().max_by(|s, t| near(s).total_cmp(&near(t))).expect("triangles");
             let (point, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
             let eye = Eye { eye: point + 4.0 * normal + DVec3::new(1.0, 0.5, 0.2), at: point, lens: 1e-4 };
-            let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 18, 11);
+            let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 17, 11);
             let meshes = [(halves[0].clone(), 0), (halves[1].clone(), 1)];
             let lights = [(sun(), -light, DVec3::ZERO)];
             let scene = uniform(scene(&gltf(&meshes, &materials, &lights, &eye)), 0.3);
@@ -192,12 +192,12 @@ fn tables_with_curvature_are_the_twins() {
     let scene = uniform(scene(&gltf(&meshes, &[medium(0, "table"), medium(1, "burley")], &lights, &eye)), 0.5);
     let mut all = vec![];
     for projection in [Projection::Mis, Projection::Camera] {
-        let (image, twins) = both(&scene, &Settings { projection, ..settings(10) }, 8);
+        let (image, twins) = both(&scene, &Settings { projection, ..settings(8) }, 8);
         all.extend(differences(&image, &twins));
     }
     all.sort_by(f64::total_cmp);
     let outside = all.iter().filter(|d| **d > 1e-4).count();
-    assert!(all.len() > 100, "{} lit values", all.len());
+    assert!(all.len() > 60, "{} lit values", all.len());
     // As for one table: a radius is drawn from a distribution function in f32.
     assert!(outside * 100 <= all.len(), "{outside} of {}: {:?}", all.len(), &all[all.len() - outside..]);
 }
