@@ -4,7 +4,7 @@
 //! sphere? With l the distance to the surface along a direction inside, l' that along the direction opposite across the
 //! normal, and a length L,
 //!
-//!   G = mean of ((e^(-l/3L) + e^(-l'/3L)) / 2)^3 over directions by their cosines.
+//!   G = mean of ((e^(-l/2L) + e^(-l'/2L)) / 2)^2 over directions by their cosines.
 //!
 //! A sphere of radius a has l = l' = 2 a cos, so G = 2 (1 - (1 + x) e^(-x)) / x^2, x = 2 a / L.
 //!
@@ -18,7 +18,7 @@
 //! within 10 % at alpha' = .84 ([`reach`]).
 //!
 //! Beside an edge l is short on one side alone, and less light comes out than of a sphere with that mean of e^(-l/L). Hence
-//! l and l' are averaged between the arithmetic mean and the geometric one, which sees no edges: by the power 1/3, with
+//! l and l' are averaged between the arithmetic mean and the geometric one, which sees no edges: by the power 1/2, with
 //! which cubes have about the walk's total (`translucent::model_errors`). On plates, spheres and cylinders l' = l.
 
 pub mod balance;
@@ -39,8 +39,8 @@ pub fn reach(diffuse: f64, reduced: f64) -> f64 {
 /// Directions from a point: at most and at least, and how many rays a scene may cost between them.
 const DIRECTIONS: (usize, usize) = (64, 16);
 const RAYS: usize = 4_000_000;
-/// Distance, over L, beyond which a surface is out of sight: e^(-24/3) = 3e-4.
-const SIGHT: f64 = 24.0;
+/// Distance, over L, beyond which a surface is out of sight: e^(-20/2) = 5e-5.
+const SIGHT: f64 = 20.0;
 /// Vertices closer than an internal unit over this are one.
 const GRID: f64 = (1 << 20) as f64;
 
@@ -117,9 +117,9 @@ impl Vertices {
 /// 1 / a at a point inside or on the surface, whose normal points outward.
 fn inverse_radius(mesh: &Mesh, point: DVec3, normal: DVec3, length: f64, directions: usize) -> f64 {
     let (u, v) = normal.any_orthonormal_pair();
-    // 1 - e^(-l/3L), whose digits remain when L is long.
+    // 1 - e^(-l/2L), whose digits remain when L is long.
     let missed = |direction: DVec3| match mesh.leave(point, direction, SIGHT * length) {
-        Met::Surface { distance, .. } => -(-distance / (3.0 * length)).exp_m1(),
+        Met::Surface { distance, .. } => -(-distance / (2.0 * length)).exp_m1(),
         _ => 1.0,
     };
     // Pairs on opposite sides of the normal, along a spiral.
@@ -129,7 +129,7 @@ fn inverse_radius(mesh: &Mesh, point: DVec3, normal: DVec3, length: f64, directi
         let (s, c) = (TAU * 0.618_033_988_749_895 * k as f64).sin_cos();
         let aside = (1.0 - cos * cos).sqrt() * (c * u + s * v);
         let mean = (missed(aside - cos * normal) + missed(-aside - cos * normal)) / 2.0;
-        -(3.0 * (-mean).ln_1p()).exp_m1()
+        mean * (2.0 - mean)
     };
     let missed = (0..pairs).map(pair).sum::<f64>() / pairs as f64;
     2.0 / (length * diameter(missed))

@@ -17,7 +17,8 @@ use crate::{
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Medium, Scene, Wrap},
     settings::{Model, Projection, Settings},
     shared::{
-        self, Balance, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, TWO_SIDED, Texture, View,
+        self, Balance, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, TWO_SIDED, Texture,
+        View,
     },
 };
 use glam::{DVec3, Vec3};
@@ -326,9 +327,8 @@ fn materials(
     let mixed = scene.sets.iter().any(sets::is_mixed);
     let common = Common { frame: scene.frame, settings, thickness, mixed };
     let choice = |advice: &'_ Option<Advice>| advice.as_ref().map(|advice| advice.choice.clone());
-    let mut each = |(m, advice): (&scene::Material, &Option<Advice>)| {
-        material(m, choice(advice), common, profiles, boundaries)
-    };
+    let mut each =
+        |(m, advice): (&scene::Material, &Option<Advice>)| material(m, choice(advice), common, profiles, boundaries);
     let mut out = scene.materials.iter().zip(advice).map(&mut each).collect::<Result<Vec<_>>>()?;
     for (index, authored) in scene.materials.iter().enumerate().filter(|(_, authored)| !authored.ramp.is_empty()) {
         out[index].ramp = out.len() as u32;
