@@ -20,7 +20,7 @@
 //! exact however steep R is at r = 0. Quadrature over phi; what neighbours have in common cancels. Groups of triangles
 //! that are small beside their distance count with R at their centre (J. Barnes, P. Hut, Nature 324 (1986)): a group of
 //! the radius s at the distance d is opened unless s (1 + d / 2 L) < [`OPENING`] d, L the diffuse mean free path. Since R
-//! falls at most about as d^-3 e^(-d/L), a group errs by (3 s / d)^2 / 16 at most; the whole integral by less than .5 %, and
+//! falls at most about as d^-3 e^(-d/L), a group errs by (3 s / d)^2 / 16 at most; the whole integral by less than 1 %, and
 //! by up to 5 % where the ring at a small sphere's diameter, which holds the light that crosses it straight, ends on the
 //! body (tests/physics/balance.rs).
 
@@ -29,12 +29,13 @@ use crate::reference::profile::table::Local;
 use crate::reference::walk::mesh::Corners;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_3, TAU};
 
 /// Radius of a group over its distance below which its centre stands for it.
-pub const OPENING: f64 = 0.25;
-/// Triangles up to which each is looked at from three points; beyond, from its middle.
-const FEW: usize = 1 << 15;
+pub const OPENING: f64 = 0.4;
+/// Triangles up to which each is looked at from three points within it; beyond, from its vertices, which are fewer.
+const FEW: usize = 1 << 10;
 
 /// The balance of each channel at the three vertices of each triangle of one body.
 ///
@@ -54,13 +55,21 @@ pub fn of_mesh<'a>(
         let balance = DVec3::select(found.cmpgt(DVec3::ZERO), total / found, DVec3::ONE);
         if open { balance.min(DVec3::ONE) } else { balance }
     };
+    if corners.len() > FEW {
+        let mut places: HashMap<_, (DVec3, f64)> = HashMap::new();
+        for (triangle, curvatures) in corners.iter().zip(curvatures) {
+            for (corner, curvature) in triangle.iter().zip(curvatures.to_array()) {
+                places.entry(Vertices::key(*corner)).or_insert((*corner, curvature.into()));
+            }
+        }
+        let found: HashMap<_, Vec3> =
+            places.into_par_iter().map(|(key, (corner, curvature))| (key, at(corner, curvature).as_vec3())).collect();
+        return corners.iter().map(|triangle| triangle.map(|corner| found[&Vertices::key(corner)])).collect();
+    }
     let near = |index: usize| {
         let [a, b, c] = corners[index];
         let [of_a, of_b, of_c] = curvatures[index].as_dvec3().to_array();
         let (middle, mean) = ((a + b + c) / 3.0, (of_a + of_b + of_c) / 3.0);
-        if corners.len() > FEW {
-            return [at(middle, mean); 3];
-        }
         [(a, of_a), (b, of_b), (c, of_c)].map(|(corner, own)| at((middle + corner) / 2.0, (mean + own) / 2.0))
     };
     let found: Vec<[DVec3; 3]> = (0..corners.len()).into_par_iter().map(near).collect();

@@ -70,7 +70,7 @@ fn is_one_on_spheres() {
             let facets = (std::f64::consts::TAU / sides as f64).powi(2) / 6.0;
             for balance in profiles.balance(&sphere, 1.0 / radius, false).into_iter().flatten() {
                 let worst = (balance.as_dvec3() - 1.0).abs().max_element();
-                assert!(worst < 0.01 + facets, "radius {radius}, {sides} sides: {balance}");
+                assert!(worst < 0.015 + facets, "radius {radius}, {sides} sides: {balance}");
             }
         }
     }
@@ -86,7 +86,7 @@ fn is_one_on_planes_but_at_their_borders() {
         for (triangle, (closed, open)) in set.iter().zip(closed.iter().zip(&open)) {
             for (corner, (closed, open)) in triangle.iter().zip(closed.iter().zip(open)) {
                 if corner.abs().max_element() < half - 20.0 {
-                    assert!((closed.as_dvec3() - 1.0).abs().max_element() < 0.005, "{cells}, {corner}: {closed}");
+                    assert!((closed.as_dvec3() - 1.0).abs().max_element() < 0.01, "{cells}, {corner}: {closed}");
                 }
                 // What leaves over the border is in the matter behind.
                 assert!(open.max_element() <= 1.0 && open.min_element() > 0.99, "{cells}, {corner}: {open}");
@@ -97,7 +97,7 @@ fn is_one_on_planes_but_at_their_borders() {
     let tree = square(half, 20);
     let (tree, plane) = (Tree::new(&tree), profiles.at(0.0));
     let found = tree.integral(&plane, dvec3(half, 0.3, 0.0), LENGTH);
-    assert!((found * 2.0 / plane.total() - 1.0).abs().max_element() < 0.005, "{found}");
+    assert!((found * 2.0 / plane.total() - 1.0).abs().max_element() < 0.01, "{found}");
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn a_plate_counts_twice_what_its_other_side_receives() {
             let plate = corners(&Mesh::cuboid(dvec3(120.0, 120.0, thickness), cells));
             let found = Tree::new(&plate).integral(&local, dvec3(0.2, 0.1, thickness / 2.0), LENGTH);
             let worst = (found / expected - 1.0).abs().max_element();
-            assert!(worst < 0.005, "{thickness}, {curvature}, {cells} cells: {found} for {expected}");
+            assert!(worst < 0.01, "{thickness}, {curvature}, {cells} cells: {found} for {expected}");
         }
     }
 }
@@ -122,7 +122,7 @@ fn groups_stand_for_their_triangles() {
     let profiles = Profiles::new();
     let [coarse, fine] = [1, 48].map(|cells| corners(&Mesh::cuboid(dvec3(4.0, 6.0, 2.0), cells)));
     let [coarse, fine] = [&coarse, &fine].map(|corners| Tree::new(corners));
-    for (curvature, most) in [(0.0, 0.005), (0.1, 0.005), (0.7, 0.05)] {
+    for (curvature, most) in [(0.0, 0.01), (0.1, 0.01), (0.7, 0.06)] {
         let local = profiles.at(curvature);
         for point in [dvec3(0.1, 0.2, 1.0), dvec3(1.98, 0.1, 1.0), dvec3(2.0, 2.99, 0.97), DVec3::ZERO] {
             let [exact, found] = [&coarse, &fine].map(|tree| tree.integral(&local, point, LENGTH));

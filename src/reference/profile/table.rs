@@ -44,20 +44,43 @@ struct Column<'a> {
     within: &'a [f32],
 }
 
+/// Where a squared distance lies in the grid.
+#[derive(Clone, Copy)]
+enum Place {
+    /// Before the first node, at this share of it.
+    Before(f64),
+    /// In cell i, this far past its node, and the same as a share of the cell.
+    Cell { i: usize, past: f64, t: f64 },
+    /// Where nothing is.
+    Beyond,
+}
+
 impl Column<'_> {
-    /// Value at the squared distance.
-    fn value(&self, s: f64) -> f64 {
+    /// Where the squared distance lies in the grid.
+    fn place(&self, s: f64) -> Place {
         let cell = grid::cell(s as f32);
         if cell < self.first {
-            return f64::from(self.within[0]) / (PI * f64::from(grid::node(self.first)));
+            return Place::Before(s / f64::from(grid::node(self.first)));
         }
         let i = (cell - self.first) as usize;
         if i >= self.reached {
-            return 0.0;
+            return Place::Beyond;
         }
         let [low, high] = [cell, cell + 1].map(|cell| f64::from(grid::node(cell)));
-        let t = (s - low) / (high - low);
-        f64::from(self.values[i]) * (1.0 - t) + f64::from(self.values[i + 1]) * t
+        Place::Cell { i, past: s - low, t: (s - low) / (high - low) }
+    }
+
+    /// Value at the squared distance.
+    fn value(&self, s: f64) -> f64 {
+        self.value_in(self.place(s))
+    }
+
+    fn value_in(&self, place: Place) -> f64 {
+        match place {
+            Place::Before(_) => f64::from(self.within[0]) / (PI * f64::from(grid::node(self.first))),
+            Place::Cell { i, t, .. } => f64::from(self.values[i]) * (1.0 - t) + f64::from(self.values[i + 1]) * t,
+            Place::Beyond => 0.0,
+        }
     }
 
     /// Squared distance within which the share u of the light lies.
@@ -83,16 +106,17 @@ impl Column<'_> {
 
     /// Light within the squared distance.
     fn inside(&self, s: f64) -> f64 {
-        let cell = grid::cell(s as f32);
-        if cell < self.first {
-            return f64::from(self.within[0]) * s / f64::from(grid::node(self.first));
+        self.inside_of(self.place(s))
+    }
+
+    fn inside_of(&self, place: Place) -> f64 {
+        match place {
+            Place::Before(share) => f64::from(self.within[0]) * share,
+            Place::Cell { i, past, .. } => {
+                f64::from(self.within[i]) + PI * past * (f64::from(self.values[i]) + self.value_in(place)) / 2.0
+            }
+            Place::Beyond => self.total(),
         }
-        let i = (cell - self.first) as usize;
-        if i >= self.reached {
-            return self.total();
-        }
-        let low = f64::from(grid::node(cell));
-        f64::from(self.within[i]) + PI * (s - low) * (f64::from(self.values[i]) + self.value(s)) / 2.0
     }
 }
 
@@ -232,32 +256,31 @@ impl<'a> Local<'a> {
         Local { parts: parts(matter).into_iter().map(of).collect() }
     }
 
-    fn sum(&self, f: impl Fn(&Part, &Column) -> f64) -> DVec3 {
-        let of = |(part, columns): &(Part, [Column; 3])| {
-            part.weight * DVec3::from(columns.each_ref().map(|column| f(part, column)))
-        };
-        self.parts.iter().map(of).sum()
+    fn sum(&self, f: impl Fn(&Part, &[Column; 3]) -> DVec3) -> DVec3 {
+        self.parts.iter().map(|(part, columns)| part.weight * f(part, columns)).sum()
     }
 
     /// Value at the squared distance.
     pub fn value(&self, squared: f64) -> DVec3 {
-        self.sum(|part, column| {
+        self.sum(|part, columns| {
             let (s, area) = part.bent(squared);
-            area * column.value(s)
+            let place = columns[0].place(s);
+            area * DVec3::from(columns.each_ref().map(|column| column.value_in(place)))
         })
     }
 
     /// Light within the squared distance.
     pub fn inside(&self, squared: f64) -> DVec3 {
-        self.sum(|part, column| {
+        self.sum(|part, columns| {
             let (s, area) = part.bent(squared);
-            if area > 0.0 { column.inside(s) } else { column.total() }
+            let place = if area > 0.0 { columns[0].place(s) } else { Place::Beyond };
+            DVec3::from(columns.each_ref().map(|column| column.inside_of(place)))
         })
     }
 
     /// All light.
     pub fn total(&self) -> DVec3 {
-        self.sum(|_, column| column.total())
+        self.sum(|_, columns| DVec3::from(columns.each_ref().map(Column::total)))
     }
 
     /// Distance beyond which there is nothing.
