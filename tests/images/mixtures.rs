@@ -101,7 +101,7 @@ fn body_of_two_media_against_the_integrator() {
             let [a, b, c] = *corners.iter().max_by(|s, t| near(s).total_cmp(&near(t))).expect("triangles");
             let (point, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
             let eye = Eye { eye: point + 4.0 * normal + DVec3::new(1.0, 0.5, 0.2), at: point, lens: 1e-4 };
-            let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 17, 11);
+            let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 18, 11);
             let meshes = [(halves[0].clone(), 0), (halves[1].clone(), 1)];
             let lights = [(sun(), -light, DVec3::ZERO)];
             let scene = uniform(scene(&gltf(&meshes, &materials, &lights, &eye)), 0.3);
