@@ -33,7 +33,7 @@ pub struct TranslucentSettings {
     pub variance: VkBool32,
     /// VK_TRUE adds the environment where a camera ray hits nothing.
     pub show_environment: VkBool32,
-    /// "auto", "standard", "better", "directional", "burley" or "table"; null is "auto".
+    /// "auto", "standard", "better", "directional", "burley", "table" or "lambert"; null is "auto".
     pub model: *const c_char,
     /// Name of the camera; null: the first, or one that frames the scene.
     pub camera: *const c_char,

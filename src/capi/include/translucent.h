@@ -169,7 +169,7 @@ typedef struct TranslucentSettings {
   VkBool32 variance;
   // VK_TRUE adds the environment where a camera ray hits nothing.
   VkBool32 show_environment;
-  // "auto", "standard", "better", "directional", "burley" or "table"; null is "auto".
+  // "auto", "standard", "better", "directional", "burley", "table" or "lambert"; null is "auto".
   const char *model;
   // Name of the camera; null: the first, or one that frames the scene.
   const char *camera;
