@@ -96,5 +96,6 @@ fn header_in_the_repository_is_fresh() {
 #[test]
 fn push_constants_fit_every_device() {
     assert!(size_of::<shared::Step>() <= 128, "the core guarantee");
-    assert!(shared::Slot::ALL.len() <= 24, "few slots, so that most devices have enough");
+    // What the Vulkan Roadmap 2022 milestone promises; the core itself promises 4.
+    assert!(shared::Slot::ALL.len() <= 30, "few slots, so that most devices have enough");
 }
