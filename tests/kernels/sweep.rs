@@ -292,7 +292,8 @@ fn a_million_sets_through_every_kernel() {
     found.report("primary", 1e-3);
     drawn.report("sample", 1e-3);
     // Rays in the plane of a sliver: whether they pierce it is rounding.
-    carried.report("reproject", 1e-2);
+    // Probes farther than 100 units, where f32 knows positions to 1e-5 and a small body is missed or met by that.
+    carried.report("reproject", 2e-2);
     lit.report("accumulate", 1e-2);
     reflected.report("reflect", 1e-2);
     resolved.report("resolve", 0.0);
