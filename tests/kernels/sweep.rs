@@ -152,27 +152,45 @@ fn surfaces(inputs: &Inputs, seed: u32) -> Vec<Surface> {
     (0..PIXELS).map(|_| surface()).collect()
 }
 
+/// Distance from which f32 loses where a line passes the set: rounded to 2^-24 of it, positions are known to 6e-6, as
+/// much as the smallest triangles hold in f32 of their own size.
+const FAR: f32 = 100.0;
+
 /// What was found of one kernel.
 #[derive(Default)]
 struct Census {
     items: usize,
     /// Relative differences beyond 1e-3, or one of the two found nothing.
     apart: usize,
+    /// Items to which f32 has no answer, of which only finite light is asked, and how many of those are apart.
+    lost: usize,
+    lost_apart: usize,
 }
 
 impl Census {
     fn add(&mut self, what: &str, gpu: Vec3, twin: Vec3) {
+        self.add_of(what, gpu, twin, false);
+    }
+
+    fn add_of(&mut self, what: &str, gpu: Vec3, twin: Vec3, lost: bool) {
         assert!(gpu.is_finite() && gpu.min_element() >= 0.0, "{what}: {gpu}");
         assert!(twin.is_finite() && twin.min_element() >= 0.0, "{what}: twin {twin}");
-        self.items += 1;
+        let (items, apart) = match lost {
+            true => (&mut self.lost, &mut self.lost_apart),
+            false => (&mut self.items, &mut self.apart),
+        };
+        *items += 1;
         // Below, the light is nothing beside what arrived: the Fresnel term of n = 1 + 1e-6 is 2e-13, in f32 1 - 1.
         let scale = gpu.length().max(twin.length()).max(1e-6);
-        self.apart += usize::from((gpu - twin).length() > 1e-3 * scale);
+        *apart += usize::from((gpu - twin).length() > 1e-3 * scale);
     }
 
     fn report(&self, kernel: &str, share: f64) {
-        println!("{kernel}: {} sets, {} differ from the twin by more than 1e-3", self.items, self.apart);
-        assert!(self.items >= 1_000_000, "{kernel}: {}", self.items);
+        let Census { items, apart, lost, lost_apart } = self;
+        println!(
+            "{kernel}: {items} sets, {apart} differ from the twin by more than 1e-3; far ones {lost}, {lost_apart}"
+        );
+        assert!(items + lost >= 1_000_000 && items > lost, "{kernel}: {items} and {lost}");
         assert!(self.apart as f64 <= share * self.items as f64, "{kernel}: {} of {}", self.apart, self.items);
     }
 }
@@ -225,9 +243,10 @@ fn a_million_sets_through_every_kernel() {
         let hits: Vec<_> = (pixels.clone())
             .map(|i| reproject(&inputs, &step, i, &surfaces[i as usize], &probes[i as usize]))
             .collect();
-        for (gpu, twin) in out.get::<Hits>(Slot::HitLists).iter().zip(&hits) {
+        for ((gpu, twin), probe) in out.get::<Hits>(Slot::HitLists).iter().zip(&hits).zip(&probes) {
             assert!(gpu.t[..gpu.count.min(8) as usize].iter().all(|t| t.is_finite()), "{what}");
-            carried.add(&what, Vec3::splat(gpu.count as f32), Vec3::splat(twin.count as f32));
+            let far = probe.offset.length() > FAR;
+            carried.add_of(&what, Vec3::splat(gpu.count as f32), Vec3::splat(twin.count as f32), far);
         }
 
         let sums = vec![Sums::default(); PIXELS as usize];
@@ -291,9 +310,8 @@ fn a_million_sets_through_every_kernel() {
     bench().check();
     found.report("primary", 1e-3);
     drawn.report("sample", 1e-3);
-    // Rays in the plane of a sliver: whether they pierce it is rounding.
-    // Probes farther than 100 units, where f32 knows positions to 1e-5 and a small body is missed or met by that.
-    carried.report("reproject", 2e-2);
+    // A ray meets one of a world's 72 edges within rounding (2^-22) once in 1e5.
+    carried.report("reproject", 2e-5);
     lit.report("accumulate", 1e-2);
     reflected.report("reflect", 1e-2);
     resolved.report("resolve", 0.0);
