@@ -60,8 +60,9 @@
 //! | --- | --- | --- |
 //! | [`shared`] | nothing | every struct, buffer, constant and feature that Rust and GLSL share |
 //! | [`error`] | nothing | [`Error`]: file, item and problem, or the step |
-//! | [`settings`] | `shared` | [`Settings`]: what a caller may choose |
-//! | [`scene`] | `shared`, `error`, `settings` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
+//! | [`profile`] | nothing | [`profile::Timeline`]: what takes how long; traces and sums |
+//! | [`settings`] | `shared`, `profile` | [`Settings`]: what a caller may choose |
+//! | [`scene`] | `shared`, `error`, `settings`, `profile` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
@@ -72,6 +73,7 @@
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`measure`] | all of these | numeric experiments: kernels beside closed forms |
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
+//! | [`bench`] | all of these | fixed work, timed again and again, and compared |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //!
 //! Unsafe code is denied outside of `gpu`, but for [`Renderer::record`], whose command buffer is the caller's. The C
@@ -83,6 +85,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod bench;
 pub mod curvature;
 pub mod error;
 #[doc = include_str!("docs/extremes.md")]
@@ -95,6 +98,7 @@ pub mod measure;
 pub mod model;
 pub mod model_errors;
 pub mod prepare;
+pub mod profile;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -3,7 +3,7 @@
 mod program;
 
 use clap::{Parser, Subcommand};
-use program::{inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables};
+use program::{bench::Bench, inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables};
 use std::process::ExitCode;
 
 /// Renders translucent matter (marble, skin, milk, wax) in glTF scenes with Vulkan compute.
@@ -26,6 +26,8 @@ enum Command {
     Inspect(Box<Inspect>),
     /// Measure on scenes with a known answer, and plot both.
     Measure(Box<Measure>),
+    /// Time fixed work again and again, kernel by kernel, or say whether two such runs differ beyond noise.
+    Bench(Box<Bench>),
     /// Put the parts of a larger render together, weighted by samples.
     Merge(Merge),
     /// List every named material with its coefficients, mean free path and colour.
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         Command::Render(render) => render.run(),
         Command::Inspect(inspect) => inspect.run(),
         Command::Measure(measure) => measure.run(),
+        Command::Bench(bench) => bench.run(),
         Command::Merge(merge) => merge.run(),
         Command::Presets => tables::presets(),
         Command::Devices => tables::devices(),

@@ -1,6 +1,6 @@
 //! What a caller may choose about a render.
 
-use crate::shared;
+use crate::{profile::Timeline, shared};
 use std::{fmt, str::FromStr};
 
 /// How a sampled point of the tangent plane is carried to the surface.
@@ -188,6 +188,9 @@ pub struct Settings {
     pub recording: bool,
     /// Invocations of a workgroup, 1 to 128; the image does not depend on it.
     pub workgroup: u32,
+    /// Where the renderer notes what takes how long; without it nothing is timed. Recordings into a caller's command
+    /// buffer are the caller's to time ([`Renderer::record_timed`](crate::Renderer::record_timed)).
+    pub timeline: Option<Timeline>,
 }
 
 impl Default for Settings {
@@ -210,6 +213,7 @@ impl Default for Settings {
             band_pixels: None,
             recording: false,
             workgroup: shared::WORKGROUP,
+            timeline: None,
         }
     }
 }

@@ -7,6 +7,7 @@ use super::{
     instance::{Candidate, DeviceInfo, Instance, ValidationLog, describe},
     kernel::Compiled,
     memory::{Allocation, Allocator, MemoryRequest},
+    profiling::{Available, Profiling},
     requirements::{self, Requirements},
 };
 use crate::{Error, Result, shared::Slot};
@@ -16,6 +17,7 @@ use ash::{
 };
 use gpu_allocator::{AllocationSizes, vulkan as memory};
 use std::{
+    ffi::CStr,
     fmt,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
@@ -35,6 +37,9 @@ pub struct DeviceOptions {
     pub staging: bool,
     /// Most bytes of one buffer, where that is less than what the device binds.
     pub buffer_bytes: Option<u64>,
+    /// Enables what profiles make use of, where the device has it: VK_EXT_calibrated_timestamps, which puts the device's
+    /// work on the host's clock. Timestamps themselves need nothing.
+    pub profiling: bool,
 }
 
 /// A Vulkan device that a caller made and keeps, for [`Device::from_raw`].
@@ -131,6 +136,7 @@ pub(super) struct Handles {
     pub limits: vk::PhysicalDeviceLimits,
     /// 0 where the queue has no timestamps.
     pub timestamp_bits: u32,
+    pub profiling: Profiling,
     pub force_staging: bool,
     max_buffer_bytes: u64,
     heap_bytes: u64,
@@ -281,9 +287,13 @@ impl Handles {
         let priorities = [1.0];
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(chosen.family).queue_priorities(&priorities)];
-        let extensions: &[_] = if chosen.host_import { &[external_memory_host::NAME.as_ptr()] } else { &[] };
+        let available = if options.profiling { Available::of(&instance, physical) } else { Available::default() };
+        let mut extensions: Vec<_> = available.names().into_iter().map(CStr::as_ptr).collect();
+        if chosen.host_import {
+            extensions.push(external_memory_host::NAME.as_ptr());
+        }
         let mut requirements = Requirements::new();
-        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(extensions);
+        let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
         let create = requirements.chain(create);
         // SAFETY: the physical device is of this instance and has the features; all pointers outlive the call.
         let device = unsafe { instance.raw.create_device(physical, &create, None) }.during("create the device")?;
@@ -303,6 +313,7 @@ impl Handles {
             log: instance.log.clone(),
         });
         handles.force_staging = options.staging;
+        handles.profiling = Profiling::new(available, &raw, &handles.device);
         handles.max_buffer_bytes = handles.max_buffer_bytes.min(options.buffer_bytes.unwrap_or(u64::MAX));
         // From here on dropping `handles` destroys the device, before the instance.
         handles.owned = Some(instance);
@@ -343,6 +354,7 @@ impl Handles {
             info: parts.info,
             limits,
             timestamp_bits: families[family as usize].timestamp_valid_bits,
+            profiling: Profiling::default(),
             force_staging: false,
             max_buffer_bytes: u64::from(limits.max_storage_buffer_range)
                 .min(maintenance3.max_memory_allocation_size)

@@ -84,7 +84,7 @@ pub(super) struct Instance {
     pub log: ValidationLog,
     messenger: Option<(debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     // Holds the loader's library open for as long as the instance lives.
-    _entry: ash::Entry,
+    pub entry: ash::Entry,
 }
 
 /// A physical device, and the queue family that we would use.
@@ -147,7 +147,7 @@ impl Instance {
             vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::Device(NO_DRIVER.into()),
             result => Error::Vulkan { step: "create the instance".into(), result },
         })?;
-        let mut instance = Instance { raw, debug_utils, log: ValidationLog::default(), messenger: None, _entry: entry };
+        let mut instance = Instance { raw, debug_utils, log: ValidationLog::default(), messenger: None, entry };
         if validation && debug_utils {
             instance.listen()?;
         }
@@ -163,7 +163,7 @@ impl Instance {
             .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
             .pfn_user_callback(Some(report))
             .user_data(Arc::as_ptr(&self.log.0).cast_mut().cast());
-        let functions = debug_utils::Instance::new(&self._entry, &self.raw);
+        let functions = debug_utils::Instance::new(&self.entry, &self.raw);
         // SAFETY: the extension is enabled; the user data is the log's, which lives until the messenger is destroyed.
         let messenger = unsafe { functions.create_debug_utils_messenger(&create, None) }
             .during("create the validation messenger")?;

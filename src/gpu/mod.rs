@@ -7,21 +7,24 @@
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod buffer;
+mod clock;
 mod commands;
 mod device;
 mod instance;
 mod kernel;
 mod memory;
+mod profiling;
 mod recorder;
 mod requirements;
 
 pub use buffer::{Buffer, Location, download, download_to, upload};
+pub use clock::{Clock, Moment};
 pub use commands::{Commands, Timestamps};
 pub use device::{Device, DeviceOptions, RawDevice};
 pub use instance::{DeviceInfo, DeviceKind, ValidationLog};
 pub use kernel::{Bindings, Kernel, Layout};
 pub use memory::{Allocation, Allocator, MemoryRequest};
-pub use recorder::Recorder;
+pub use recorder::{Recorder, Scope, Timing};
 pub use requirements::Requirements;
 
 use crate::{Error, Result};

@@ -3,16 +3,18 @@
 use super::{
     During,
     buffer::Buffer,
+    clock::Clock,
     commands::{Commands, Timestamps},
     device::{Device, Handles},
     kernel::{Bindings, Kernel},
+    profiling::nanoseconds,
 };
-use crate::{Result, shared::Step};
+use crate::{Error, Result, shared::Step};
 use ash::vk;
-use std::{any::Any, sync::Arc};
+use std::{any::Any, sync::Arc, time::Instant};
 
-/// Dispatches of one recording that a profile times; later ones are not.
-const TIMED: u32 = 2048;
+/// Dispatches whose times one query pool holds; a recording of more gets another.
+const TIMED: u32 = 1024;
 
 /// One command buffer, used again and again: `begin`, commands, `submit_and_wait`.
 pub struct Recorder {
@@ -28,9 +30,34 @@ pub struct Recorder {
 }
 
 struct Profile {
-    queries: vk::QueryPool,
-    names: Vec<&'static str>,
-    seconds: Vec<f64>,
+    clock: Clock,
+    pools: Vec<vk::QueryPool>,
+    // What was dispatched since `begin`, and why the times of the rest have no place.
+    dispatched: Vec<(&'static str, Step)>,
+    failure: Option<Error>,
+    timing: Timing,
+}
+
+/// When a recording ran.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timing {
+    pub submitted: Instant,
+    /// Nanoseconds from there until the host saw its end.
+    pub ended: f64,
+    /// Nanoseconds by which the dispatches may be early or late as a whole; their durations are not affected.
+    pub deviation: f64,
+    /// Each dispatch in order; none on a device without timestamps.
+    pub scopes: Vec<Scope>,
+}
+
+/// When a dispatch ran: nanoseconds since [`Timing::submitted`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scope {
+    /// [`Kernel::stem`].
+    pub kernel: &'static str,
+    pub step: Step,
+    pub begin: f64,
+    pub end: f64,
 }
 
 impl Recorder {
@@ -42,7 +69,7 @@ impl Recorder {
         Recorder::with_handles(&device.handles, false)
     }
 
-    /// A recorder that also times each dispatch; see [`Recorder::scopes`].
+    /// A recorder that also times each dispatch; see [`Recorder::timing`].
     ///
     /// # Errors
     /// As [`Recorder::new`].
@@ -71,12 +98,9 @@ impl Recorder {
             recorder.commands.raw =
                 device.allocate_command_buffers(&allocate).during("allocate the command buffer")?[0];
             recorder.fence = device.create_fence(&vk::FenceCreateInfo::default(), None).during("create the fence")?;
-            if profiled && handles.timestamp_bits > 0 {
-                let create =
-                    vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * TIMED);
-                let queries = device.create_query_pool(&create, None).during("create the timestamps")?;
-                recorder.profile = Some(Profile { queries, names: Vec::new(), seconds: Vec::new() });
-            }
+        }
+        if profiled {
+            recorder.profile = Some(Profile::new(handles));
         }
         handles.name(recorder.commands.raw, "recording");
         Ok(recorder)
@@ -99,9 +123,8 @@ impl Recorder {
         }
         self.recording = true;
         if let Some(profile) = &mut self.profile {
-            profile.names.clear();
-            profile.seconds.clear();
-            self.commands.reset_queries(Timestamps { pool: profile.queries, first: 0 }, 2 * TIMED);
+            profile.dispatched.clear();
+            profile.failure = None;
         }
         // Buffers persist, so what earlier recordings wrote must be seen here.
         self.commands.barrier();
@@ -119,10 +142,7 @@ impl Recorder {
         }
         self.hold(&kernel.objects);
         self.hold(&bindings.objects);
-        let times = self.profile.as_mut().filter(|profile| profile.names.len() < TIMED as usize).map(|profile| {
-            profile.names.push(kernel.objects.stem);
-            Timestamps { pool: profile.queries, first: 2 * (profile.names.len() as u32 - 1) }
-        });
+        let times = self.profile.as_mut().and_then(|profile| profile.next(&self.commands, kernel, step));
         self.commands.dispatch(kernel, bindings, invocations, step, times);
     }
 
@@ -164,11 +184,15 @@ impl Recorder {
     pub fn submit_and_wait(&mut self) -> Result<()> {
         self.check();
         self.recording = false;
+        if let Some(error) = self.profile.as_mut().and_then(|profile| profile.failure.take()) {
+            return Err(error);
+        }
         let handles = &self.commands.handles;
         let device = &handles.device;
         self.commands.host_barrier();
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands.raw)];
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
+        let submitted = Instant::now();
         // SAFETY: the recording is open and complete, what it uses is held; the queue is ours while locked.
         unsafe {
             device.end_command_buffer(self.commands.raw).during("end the recording")?;
@@ -178,28 +202,16 @@ impl Recorder {
             device.wait_for_fences(&[self.fence], true, u64::MAX).during("wait for the recording")?;
         }
         self.pending = false;
-        self.read_profile()
+        self.profile.as_mut().map_or(Ok(()), |profile| profile.read(handles, submitted))
     }
 
-    /// Name and time (s) of each dispatch of the last recording, in order: the first 2,048, and none without
-    /// [`Recorder::profiled`] or on a device without timestamps.
-    pub fn scopes(&self) -> Vec<(&'static str, f64)> {
-        self.profile.iter().flat_map(|p| p.names.iter().copied().zip(p.seconds.iter().copied())).collect()
-    }
-
-    fn read_profile(&mut self) -> Result<()> {
-        let Some(profile) = self.profile.as_mut().filter(|profile| !profile.names.is_empty()) else { return Ok(()) };
-        let mut ticks = vec![0u64; 2 * profile.names.len()];
-        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: the recording has run, so that many queries were written.
-        unsafe { self.commands.handles.device.get_query_pool_results(profile.queries, 0, &mut ticks, flags) }
-            .during("read the timestamps")?;
-        let period = f64::from(self.commands.handles.limits.timestamp_period) * 1e-9;
-        // The counter has this many bits and wraps.
-        let mask = u64::MAX >> (64 - self.commands.handles.timestamp_bits.min(64));
-        let pairs = ticks.chunks_exact(2);
-        profile.seconds = pairs.map(|pair| (pair[1].wrapping_sub(pair[0]) & mask) as f64 * period).collect();
-        Ok(())
+    /// When the last recording ran, and each of its dispatches; none without [`Recorder::profiled`].
+    ///
+    /// On a device that was opened with [`DeviceOptions::profiling`](super::DeviceOptions::profiling) and has
+    /// VK_EXT_calibrated_timestamps, dispatches are where the device's clock says; elsewhere in the middle of where they
+    /// can be between submission and end.
+    pub fn timing(&self) -> Option<&Timing> {
+        self.profile.as_ref().map(|profile| &profile.timing)
     }
 
     fn check(&self) {
@@ -231,11 +243,71 @@ impl Drop for Recorder {
         let device = &self.commands.handles.device;
         // SAFETY: nothing of it runs any more; null handles are ignored.
         unsafe {
-            if let Some(profile) = &self.profile {
-                device.destroy_query_pool(profile.queries, None);
+            for pool in self.profile.iter().flat_map(|profile| &profile.pools) {
+                device.destroy_query_pool(*pool, None);
             }
             device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
         }
+    }
+}
+
+impl Profile {
+    fn new(handles: &Handles) -> Profile {
+        let period = f64::from(handles.limits.timestamp_period);
+        Profile {
+            clock: Clock { period, bits: handles.timestamp_bits },
+            pools: Vec::new(),
+            dispatched: Vec::new(),
+            failure: None,
+            timing: Timing { submitted: Instant::now(), ended: 0.0, deviation: 0.0, scopes: Vec::new() },
+        }
+    }
+
+    /// Where the times of the next dispatch go. That there is no place is told when the recording is submitted.
+    fn next(&mut self, commands: &Commands, kernel: &Kernel, step: &Step) -> Option<Timestamps> {
+        if self.clock.bits == 0 || self.failure.is_some() {
+            return None;
+        }
+        let (index, first) = (self.dispatched.len() / TIMED as usize, self.dispatched.len() as u32 % TIMED);
+        if index == self.pools.len() {
+            let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * TIMED);
+            // SAFETY: the device is alive; dropping the recorder destroys the pool.
+            match unsafe { commands.handles.device.create_query_pool(&create, None) }.during("create the timestamps") {
+                Ok(pool) => self.pools.push(pool),
+                Err(error) => {
+                    self.failure = Some(error);
+                    return None;
+                }
+            }
+        }
+        let pool = self.pools[index];
+        if first == 0 {
+            commands.reset_queries(Timestamps { pool, first: 0 }, 2 * TIMED);
+        }
+        self.dispatched.push((kernel.objects.stem, *step));
+        Some(Timestamps { pool, first: 2 * first })
+    }
+
+    /// Fetches the times of a recording that has just ended.
+    fn read(&mut self, handles: &Handles, submitted: Instant) -> Result<()> {
+        let ended = nanoseconds(submitted);
+        self.timing = Timing { submitted, ended, deviation: 0.0, scopes: Vec::with_capacity(self.dispatched.len()) };
+        let mut ticks = vec![0u64; 2 * self.dispatched.len()];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        for (pool, ticks) in self.pools.iter().zip(ticks.chunks_mut(2 * TIMED as usize)) {
+            // SAFETY: the recording has run, so that many queries were written.
+            unsafe { handles.device.get_query_pool_results(*pool, 0, ticks, flags) }.during("read the timestamps")?;
+        }
+        let (Some(&first), Some(&last)) = (ticks.first(), ticks.last()) else { return Ok(()) };
+        let clock = self.clock;
+        let anchor = clock.place([first, last], [0.0, ended], handles.moment(submitted));
+        self.timing.deviation = anchor.deviation;
+        let pairs = self.dispatched.iter().zip(ticks.chunks_exact(2));
+        self.timing.scopes.extend(pairs.map(|(&(kernel, step), pair)| {
+            let [begin, end] = [pair[0], pair[1]].map(|ticks| clock.host(anchor, ticks));
+            Scope { kernel, step, begin, end }
+        }));
+        Ok(())
     }
 }

@@ -30,7 +30,7 @@ pub struct Inspect {
 
 impl Inspect {
     pub fn run(self) -> Result<ExitCode, Failure> {
-        let (scene, warnings) = self.scene.load().map_err(Failure::while_reading)?;
+        let (scene, warnings) = self.scene.load(None).map_err(Failure::while_reading)?;
         let limits = match self.device {
             None => Limits::NONE,
             device => Limits::of(&Device::open(&DeviceOptions { device, ..DeviceOptions::default() })?),

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, arguments, plot, print,
-    tables::{aligned, row, significant},
+    tables::{aligned, quoted, row, significant},
 };
 use serde_json::{Value, json};
 use std::{
@@ -171,11 +171,6 @@ fn csv(figure: &Figure) -> String {
         }
     }
     text
-}
-
-/// A field of CSV (RFC 4180).
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// A number, or nothing where there is none.

@@ -1,11 +1,13 @@
 //! What each command does, and how it ends.
 
 pub mod arguments;
+pub mod bench;
 pub mod inspect;
 pub mod log;
 pub mod measure;
 pub mod merge;
 pub mod plot;
+pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod tables;

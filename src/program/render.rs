@@ -1,10 +1,11 @@
 //! `render`: a glTF scene becomes an EXR image, and a PNG where one is asked for.
 
-use super::{Failure, INTERRUPTED, arguments, log, print, scene::SceneOptions};
+use super::{Failure, INTERRUPTED, arguments, log, print, profile, scene::SceneOptions};
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::{
     fmt,
+    iter::once,
     ops::{ControlFlow, Range},
     path::PathBuf,
     process::ExitCode,
@@ -17,6 +18,7 @@ use std::{
 use translucent::{
     Device, DeviceOptions, Image, Renderer, Settings,
     image::{Attribute, check_writable},
+    profile::{Timeline, begin},
     shared::BATCHES,
 };
 
@@ -53,6 +55,10 @@ pub struct Render {
     /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
     #[arg(long, value_name = "INDEX|NAME|UUID")]
     device: Option<String>,
+    /// Time each kernel and what the host does: .json is a trace that Perfetto opens, .csv has a row for each kernel.
+    /// May be repeated.
+    #[arg(long, value_name = "FILE.json|.csv")]
+    profile: Vec<PathBuf>,
     /// No progress, notes or warnings.
     #[arg(long)]
     quiet: bool,
@@ -65,11 +71,16 @@ impl Render {
         }
         let output = self.output()?;
         let stop = stop_on_interrupt()?;
-        let (scene, warnings) = self.scene.load().map_err(Failure::while_reading)?;
+        let timeline = (!self.profile.is_empty()).then(Timeline::new);
+        let (scene, warnings) = self.scene.load(timeline.clone()).map_err(Failure::while_reading)?;
         warnings.iter().for_each(|warning| self.warn(warning));
-        let options = DeviceOptions { device: self.device.clone(), ..DeviceOptions::default() };
+        let profiling = timeline.is_some();
+        let options = DeviceOptions { device: self.device.clone(), profiling, ..DeviceOptions::default() };
+        let opening = begin(&timeline, "device");
         let device = Device::open(&options)?;
-        let mut renderer = Renderer::new(&device, &scene, &self.settings())?;
+        drop(opening);
+        let settings = Settings { timeline: timeline.clone(), ..self.settings() };
+        let mut renderer = Renderer::new(&device, &scene, &settings)?;
         renderer.prepared().warnings().for_each(|warning| self.warn(&warning));
 
         let bar = self.bar();
@@ -89,10 +100,12 @@ impl Render {
         if let Some(Attribute::Integer(invalid @ 1..)) = image.attributes.get("translucent.invalidSamples") {
             self.warn(&format!("samples left out because they were not finite or negative: {invalid}"));
         }
+        let writing = begin(&timeline, "write");
         image.write(&output)?;
         if let Some(png) = &self.png {
             image.write_png(png, self.exposure.unwrap_or(0.0))?;
         }
+        drop(writing);
         let (width, height) = (image.width, image.height);
         let rate = f64::from(width) * f64::from(height) * samples as f64 / seconds * 1e-6;
         let note = if finished { "" } else { ", interrupted" };
@@ -100,6 +113,10 @@ impl Render {
             "{}: {width}x{height}, {samples} samples, {seconds:.2} s, {rate:.3} Msamples/s{note}\n",
             output.display()
         ))?;
+        if let Some(timeline) = &timeline {
+            profile::write(timeline, &device, &self.profile)?;
+            print(&profile::table(timeline))?;
+        }
         Ok(if finished { ExitCode::SUCCESS } else { ExitCode::from(INTERRUPTED) })
     }
 
@@ -114,9 +131,11 @@ impl Render {
                 PathBuf::from(format!("{}.exr", name.to_string_lossy()))
             }
         };
-        for (path, extension) in std::iter::once((&output, "exr")).chain(self.png.as_ref().map(|png| (png, "png"))) {
-            if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension)) {
-                return Err(Failure::input(format!("{}: its name must end in .{extension}", path.display())));
+        let images = once((&output, &["exr"][..])).chain(self.png.as_ref().map(|png| (png, &["png"][..])));
+        for (path, endings) in images.chain(self.profile.iter().map(|path| (path, &["json", "csv"][..]))) {
+            if !path.extension().is_some_and(|e| endings.iter().any(|ending| e.eq_ignore_ascii_case(ending))) {
+                let endings = endings.join(" or .");
+                return Err(Failure::input(format!("{}: its name must end in .{endings}", path.display())));
             }
             check_writable(path)?;
             self.scene.keep_from(path)?;

@@ -6,6 +6,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
+    profile::Timeline,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
     settings::Directional,
 };
@@ -119,9 +120,13 @@ fn single_scattering() -> impl TypedValueParser<Value = SingleScattering> {
 
 impl SceneOptions {
     /// The scene with its environment, and what a user should know about it.
-    pub fn load(&self) -> translucent::Result<(Scene, Vec<String>)> {
-        let options =
-            LoadOptions { unit: self.unit, materials: self.material.clone(), albedo_mapping: self.albedo_mapping };
+    pub fn load(&self, timeline: Option<Timeline>) -> translucent::Result<(Scene, Vec<String>)> {
+        let options = LoadOptions {
+            unit: self.unit,
+            materials: self.material.clone(),
+            albedo_mapping: self.albedo_mapping,
+            timeline,
+        };
         let mut scene = Scene::load_with(&self.file, &options)?;
         let mut environment = match &self.environment {
             Some(EnvironmentSource::Constant(radiance)) => Some(Environment::constant(DVec3::from_array(*radiance))?),

@@ -75,3 +75,8 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
     }
     text
 }
+
+/// A field of CSV (RFC 4180).
+pub fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
+}

@@ -6,6 +6,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, download_to},
     image::{Attribute, Channel, Image},
+    profile::{self, Work},
     shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
 };
 use glam::{DVec3, Vec3};
@@ -21,6 +22,7 @@ pub enum Sums {
 /// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z,
 /// samples, material.
 pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
+    let _span = profile::begin(&renderer.settings.timeline, "image");
     renderer.catch_up();
     let view = renderer.prepared.view;
     let rows = renderer.prepared.rows.clone();
@@ -54,8 +56,11 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
             recorder.dispatch(kernel, bindings, pixels, &step);
         }
         recorder.submit_and_wait()?;
+        renderer.note("resolve", Work { band: band as u32, pixels, ..Work::default() });
+        let span = profile::begin(&renderer.settings.timeline, "download");
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
+        drop(span);
         for (pixel, surface) in resolved.iter().zip(&surfaces) {
             invalid += u64::from(pixel.invalid);
             channels.push(pixel, &centre(renderer, &geometry, surface));
@@ -169,12 +174,10 @@ impl Channels {
     }
 }
 
-fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
-    let range = renderer.samples();
+/// The settings that must agree between parts of one image; the seed stands apart.
+pub fn described(renderer: &Renderer) -> serde_json::Value {
     let settings = &renderer.settings;
-    let info = renderer.device.info();
-    // What must agree between parts of one image; the seed stands apart.
-    let described = serde_json::json!({
+    serde_json::json!({
         "resolution": [renderer.prepared.view.width, renderer.prepared.view.height],
         "camera": renderer.prepared.camera.name,
         "directions": settings.directions,
@@ -189,7 +192,13 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         "singleScattering": settings.single_scattering.to_string(),
         "radiusTail": settings.radius_tail,
         "showEnvironment": settings.show_environment,
-    });
+    })
+}
+
+fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
+    let range = renderer.samples();
+    let settings = &renderer.settings;
+    let info = renderer.device.info();
     let mut attributes: Vec<(&str, Attribute)> = vec![
         ("samples", Attribute::Integer((range.end - range.start) as i32)),
         ("sampleBegin", Attribute::Integer(range.start as i32)),
@@ -201,7 +210,7 @@ fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap
         ("device", Attribute::Text(info.name.clone())),
         ("driver", Attribute::Text(info.driver.clone())),
         ("sceneHash", Attribute::Text(renderer.scene_hash.clone())),
-        ("settings", Attribute::Text(described.to_string())),
+        ("settings", Attribute::Text(described(renderer).to_string())),
         ("invalidSamples", Attribute::Integer(invalid.min(i32::MAX as u64) as i32)),
     ];
     if !has_variance {

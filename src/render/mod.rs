@@ -4,6 +4,7 @@ mod assemble;
 mod bands;
 mod plan;
 mod record;
+mod timing;
 mod update;
 
 pub use plan::{BufferUse, KernelUse, Limits, Plan, value_name};
@@ -14,6 +15,7 @@ use crate::{
     gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, download_to, upload},
     image::Image,
     prepare::{Prepared, prepare},
+    profile::{self, Work},
     reference::random,
     scene::{self, Frame, Scene},
     settings::Settings,
@@ -98,6 +100,8 @@ pub struct Renderer {
     strata: [Option<u32>; BATCHES as usize],
     /// First sample of the sums.
     begin: Option<u32>,
+    /// Samples were submitted before, so the driver has compiled what it puts off until then.
+    warm: bool,
 }
 
 impl Renderer {
@@ -121,28 +125,32 @@ impl Renderer {
         settings: &Settings,
         buffers: Vec<(Slot, Buffer)>,
     ) -> Result<Renderer> {
-        let prepared = prepare(scene, settings)?;
-        Renderer::with_features(device, scene, settings, prepared, buffers)
+        Renderer::with_features(device, scene, settings, |_| {}, buffers)
     }
 
     /// As [`Renderer::new`], with traversal steps counted.
     pub fn counting(device: &Device, scene: &Scene, settings: &Settings) -> Result<Renderer> {
-        let mut prepared = prepare(scene, settings)?;
-        prepared.features.counters = 1;
-        Renderer::with_features(device, scene, settings, prepared, vec![])
+        Renderer::with_features(device, scene, settings, |prepared| prepared.features.counters = 1, vec![])
     }
 
     fn with_features(
         device: &Device,
         scene: &Scene,
         settings: &Settings,
-        prepared: Prepared,
+        change: impl FnOnce(&mut Prepared),
         mut given: Vec<(Slot, Buffer)>,
     ) -> Result<Renderer> {
         if !(1..=128).contains(&settings.workgroup) {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
         }
+        let span = profile::begin(&settings.timeline, "prepare");
+        let mut prepared = prepare(scene, settings)?;
+        change(&mut prepared);
+        drop(span);
+        let span = profile::begin(&settings.timeline, "pipelines");
         let kernels = Kernels::new(device, &prepared, settings.workgroup)?;
+        drop(span);
+        let _span = profile::begin(&settings.timeline, "upload");
         let recording = settings.recording;
         let mut take = |slot: Slot, bytes: u64, location: Location| {
             let Some(position) = given.iter().position(|(named, _)| *named == slot) else {
@@ -190,7 +198,11 @@ impl Renderer {
         }
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
         let bindings = Bindings::new(&Layout::new(device)?, &bound)?;
-        let recorder = if device.has_queue() { Some(Recorder::new(device)?) } else { None };
+        let recorder = match (device.has_queue(), &settings.timeline) {
+            (false, _) => None,
+            (true, None) => Some(Recorder::new(device)?),
+            (true, Some(_)) => Some(Recorder::profiled(device)?),
+        };
         Ok(Renderer {
             device: device.clone(),
             frame: scene.frame,
@@ -207,6 +219,7 @@ impl Renderer {
             resident: recording.then_some(0),
             strata: [None; BATCHES as usize],
             begin: None,
+            warm: false,
         })
     }
 
@@ -269,6 +282,7 @@ impl Renderer {
         range: Range<u32>,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<bool> {
+        let _span = profile::begin(&self.settings.timeline, "render");
         self.catch_up();
         if range.start >= range.end {
             return Err(Error::setting("samples", format!("{}:{} holds no sample", range.start, range.end)));
@@ -313,6 +327,7 @@ impl Renderer {
         if self.resident == Some(band) {
             return Ok(());
         }
+        let _span = profile::begin(&self.settings.timeline, "band");
         self.save_resident()?;
         let film = std::mem::replace(&mut self.bands[band].film, Film::OnDevice);
         let recorder = own(&mut self.recorder)?;
@@ -366,6 +381,9 @@ impl Renderer {
         }
         recorder.submit_and_wait()?;
         bands[band].end = samples.end;
+        let name = if self.warm { "submission" } else { "first dispatch" };
+        self.warm = true;
+        self.note(name, Work { band: band as u32, pixels, samples });
         Ok(())
     }
 

@@ -28,6 +28,7 @@ pub(crate) use check::{check_camera, check_light};
 
 use crate::{
     Error, Result,
+    profile::{self, Timeline},
     settings::{Directional, Model, SingleScattering},
     shared,
 };
@@ -75,6 +76,8 @@ pub struct LoadOptions {
     pub materials: Vec<(String, String)>,
     /// What the multi-scatter colour of the scattering extensions means.
     pub albedo_mapping: AlbedoMapping,
+    /// Where it is noted how long the parts of loading take.
+    pub timeline: Option<Timeline>,
 }
 
 /// What the multi-scatter colour rho of KHR_materials_scatter and KHR_materials_volume_scatter means.
@@ -94,7 +97,7 @@ const ENVIRONMENT_WARNING: &str = "environment: ";
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        LoadOptions { unit: 1.0, materials: Vec::new(), albedo_mapping: AlbedoMapping::Gltf }
+        LoadOptions { unit: 1.0, materials: Vec::new(), albedo_mapping: AlbedoMapping::Gltf, timeline: None }
     }
 }
 
@@ -114,6 +117,7 @@ impl Scene {
     /// contents break; [`Error::Setting`] for options that do not fit it. No input makes it panic.
     pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Scene> {
         let path = path.as_ref();
+        let _load = profile::begin(&options.timeline, "load");
         let bytes = std::fs::read(path).map_err(|error| Error::file(path, error))?;
         Scene::from_bytes(path, &bytes, options)
     }
@@ -146,7 +150,9 @@ impl Scene {
         if too_small > 0 {
             warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
         }
+        let building = profile::begin(&options.timeline, "bvh");
         let (nodes, order) = bvh::build(file, &triangles)?;
+        drop(building);
         let mut scene = Scene {
             file: file.to_path_buf(),
             frame,

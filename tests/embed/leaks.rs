@@ -13,6 +13,7 @@ use translucent::{
     ash::vk,
     gpu::{Buffer, Layout, Location, Recorder, download, upload},
     measure::scenes::{Eye, Mesh, gltf, matter},
+    profile::Timeline,
 };
 
 /// Counts the bytes that Rust holds.
@@ -160,8 +161,7 @@ fn cycles() {
         let buffer = Buffer::new(&device, "words", 4096, Location::Device).expect("memory");
         upload(&device, &buffer, &[1; 4096]).expect("a queue");
         assert_eq!(download(&device, &buffer, 8).expect("a queue"), [1; 8]);
-        let (_recorder, _layout) =
-            (Recorder::profiled(&device).expect("a queue"), Layout::new(&device).expect("layout"));
+        let (_recorder, _layout) = (Recorder::new(&device).expect("a queue"), Layout::new(&device).expect("layout"));
     });
     assert_eq!(live(), before);
     let device = app.open();
@@ -169,6 +169,12 @@ fn cycles() {
     flat("renderers", &mut || {
         let renderer = Renderer::new(&device, &scene, &small).expect("a renderer");
         app.run(|commands| unsafe { renderer.record(commands, 0..1).expect("it can be recorded") });
+        Renderer::new(&device, &scene, &small).expect("a renderer").render(1).expect("a device that works");
+    });
+    assert_eq!(query_pool::MADE.load(Relaxed), 0, "nothing is timed unasked");
+    flat("profiled renderers", &mut || {
+        let timed = translucent::Settings { timeline: Some(Timeline::new()), ..small.clone() };
+        Renderer::new(&device, &scene, &timed).expect("a renderer").render(1).expect("a device that works");
     });
     drop(device);
     assert_eq!(live(), before, "kernels go with their device");

@@ -1,10 +1,12 @@
 //! The program as a user meets it, and the images that it writes.
 
+mod bench;
 mod image;
 mod inspect;
 mod interrupt;
 mod measure;
 mod merge;
+mod profile;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
 mod scenes;

@@ -1,0 +1,74 @@
+//! What a profile asks of a device beyond timestamps, where the device has it: see
+//! [`DeviceOptions::profiling`](super::DeviceOptions::profiling).
+
+use super::{clock::Moment, device::Handles, instance::Instance};
+use ash::{ext::calibrated_timestamps, vk};
+use std::{ffi::CStr, time::Instant};
+
+/// How often the clocks are compared at a time; the comparison that took least counts.
+const COMPARISONS: u32 = 4;
+
+/// Which of the extensions a physical device has.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Available {
+    calibrated: bool,
+}
+
+impl Available {
+    /// What there is on a physical device of `instance`.
+    pub fn of(instance: &Instance, physical: vk::PhysicalDevice) -> Available {
+        // SAFETY: the device belongs to this instance; so for the other calls.
+        let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
+        let named = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let ticks = || {
+            let functions = calibrated_timestamps::Instance::new(&instance.entry, &instance.raw);
+            // SAFETY: the device has the extension.
+            let domains = unsafe { functions.get_physical_device_calibrateable_time_domains(physical) };
+            domains.unwrap_or_default().contains(&vk::TimeDomainEXT::DEVICE)
+        };
+        Available { calibrated: named(calibrated_timestamps::NAME) && ticks() }
+    }
+
+    /// The names to enable.
+    pub fn names(&self) -> Vec<&'static CStr> {
+        self.calibrated.then_some(calibrated_timestamps::NAME).into_iter().collect()
+    }
+}
+
+/// The functions of those that are enabled.
+#[derive(Default)]
+pub(super) struct Profiling {
+    calibrated: Option<calibrated_timestamps::Device>,
+}
+
+impl Profiling {
+    pub fn new(available: Available, instance: &ash::Instance, device: &ash::Device) -> Profiling {
+        let calibrated = available.calibrated.then(|| calibrated_timestamps::Device::new(instance, device));
+        Profiling { calibrated }
+    }
+}
+
+impl Handles {
+    /// A moment on the device's clock and on the host's, in nanoseconds since `epoch`; none where the device cannot tell.
+    ///
+    /// The device's clock is read between two readings of the host's, so no knowledge is needed of which of the system's
+    /// clocks `Instant` is; they are a microsecond or less apart.
+    pub fn moment(&self, epoch: Instant) -> Option<Moment> {
+        let functions = self.profiling.calibrated.as_ref()?;
+        let domains = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        let compare = |_| {
+            let before = nanoseconds(epoch);
+            // SAFETY: the extension is enabled, and the device has this time domain.
+            let (ticks, deviation) = unsafe { functions.get_calibrated_timestamps(&domains) }.ok()?;
+            let after = nanoseconds(epoch);
+            let deviation = (after - before) / 2.0 + deviation as f64;
+            Some(Moment { ticks: ticks[0], host: (before + after) / 2.0, deviation })
+        };
+        (0..COMPARISONS).filter_map(compare).min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+    }
+}
+
+/// Since `epoch`.
+pub(super) fn nanoseconds(epoch: Instant) -> f64 {
+    epoch.elapsed().as_nanos() as f64
+}

@@ -1,0 +1,188 @@
+//! `bench`: the time of fixed work, kernel by kernel, and whether two runs of it differ beyond noise.
+
+use super::{
+    Failure, arguments, print,
+    scene::SceneOptions,
+    tables::{aligned, row, significant},
+};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+use translucent::{
+    Device, DeviceOptions, Settings,
+    bench::{self, CONFIDENCE, Comparison, Difference, Effort, MAX_REPEATS, Report, Series, compare, statistics},
+    image::{check_writable, write_whole},
+    profile::{Timeline, begin},
+};
+
+#[derive(clap::Args)]
+pub struct Bench {
+    #[command(flatten)]
+    scene: Option<SceneOptions>,
+    /// Samples of each pixel in a repeat.
+    #[arg(long, value_name = "M", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    samples: u32,
+    /// Repeats that are counted.
+    #[arg(long, value_name = "N", default_value_t = 10,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_REPEATS)))]
+    repeat: u32,
+    /// Repeats before, which are not: drivers compile at the first.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    warmup: u32,
+    /// Key of all random numbers.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u32,
+    /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
+    #[arg(long, value_name = "INDEX|NAME|UUID")]
+    device: Option<String>,
+    /// Everything that was measured, as JSON.
+    #[arg(short, long, value_name = "OUT.json")]
+    output: Option<PathBuf>,
+    /// No progress.
+    #[arg(long)]
+    quiet: bool,
+    /// Say in which kernels two runs of the same work differ beyond noise. Exit status 0: in none; 1: in some; 2: they
+    /// cannot be compared.
+    #[arg(long, value_names = ["A.json", "B.json"], num_args = 2,
+          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "output"])]
+    compare: Option<Vec<PathBuf>>,
+    /// How sure it is that runs that do not differ are said not to, in per cent.
+    #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "99", value_parser = percentage)]
+    confidence: f64,
+    /// Least difference of times that counts, in per cent.
+    #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "0", value_parser = arguments::not_negative)]
+    least: f64,
+}
+
+fn percentage(text: &str) -> Result<f64, String> {
+    let value = arguments::positive(text).ok().filter(|value| *value < 100.0);
+    value.ok_or("it is a number between 0 and 100".into())
+}
+
+impl Bench {
+    pub fn run(self) -> Result<ExitCode, Failure> {
+        match (&self.compare, &self.scene) {
+            (Some(files), _) => self.compare(&files[0], &files[1]),
+            (None, Some(scene)) => self.measure(scene),
+            (None, None) => Err(Failure::input("bench: needs SCENE.gltf|.glb, or --compare A.json B.json")),
+        }
+    }
+
+    fn measure(&self, options: &SceneOptions) -> Result<ExitCode, Failure> {
+        if let Some(output) = &self.output {
+            if !output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
+                return Err(Failure::input(format!("{}: its name must end in .json", output.display())));
+            }
+            check_writable(output)?;
+            options.keep_from(output)?;
+        }
+        let timeline = Timeline::new();
+        let (scene, warnings) = options.load(Some(timeline.clone())).map_err(Failure::while_reading)?;
+        if !self.quiet {
+            warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        }
+        let timeline = Some(timeline);
+        let opening = begin(&timeline, "device");
+        let with = DeviceOptions { device: self.device.clone(), profiling: true, ..DeviceOptions::default() };
+        let device = Device::open(&with)?;
+        drop(opening);
+        let settings = Settings { seed: self.seed, timeline, ..options.settings() };
+        let effort = Effort { samples: self.samples, warmup: self.warmup, repeat: self.repeat };
+        let bar = self.bar();
+        let report = bench::run(&device, &scene, &settings, effort, &mut |done| bar.set_position(u64::from(done)))?;
+        bar.finish_and_clear();
+        if let Some(output) = &self.output {
+            write_whole(output, format!("{:#}\n", report.json()).as_bytes())?;
+        }
+        print(&text(&report))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn bar(&self) -> ProgressBar {
+        if self.quiet {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(u64::from(self.warmup) + u64::from(self.repeat));
+        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} repeats  {eta} left");
+        style.map_or(bar.clone(), |style| bar.with_style(style))
+    }
+
+    fn compare(&self, a: &Path, b: &Path) -> Result<ExitCode, Failure> {
+        let [first, second] =
+            [Report::read(a).map_err(Failure::while_reading)?, Report::read(b).map_err(Failure::while_reading)?];
+        let comparison = compare(&first, &second, self.confidence / 100.0, self.least / 100.0)?;
+        print(&compared(&comparison))?;
+        Ok(if comparison.differing().next().is_some() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    }
+}
+
+/// A median time with its interval.
+fn cells(name: &str, series: &Series, share: &str) -> Vec<String> {
+    let between = |estimate: statistics::Estimate| {
+        [significant(estimate.value), format!("{} to {}", significant(estimate.low), significant(estimate.high))]
+    };
+    let [median, interval] = series.median().map_or(["-".into(), "-".into()], between);
+    row([name, &series.launches.to_string(), &median, &interval, share])
+}
+
+fn text(report: &Report) -> String {
+    let start: Vec<_> = report.start_up.iter().map(|(name, ms)| format!("{name} {}", significant(*ms))).collect();
+    let mut text = format!("START-UP [ms]: {}\n\n", start.join(", "));
+    let median = |series: &Series| series.median().map_or(0.0, |median| median.value);
+    let all: f64 = report.kernels.iter().map(median).sum();
+    let mut rows = vec![row(["", "LAUNCHES", "MEDIAN [ms]", "INTERVAL [ms]", "SHARE"])];
+    let mut kernels: Vec<&Series> = report.kernels.iter().collect();
+    kernels.sort_by(|a, b| median(b).total_cmp(&median(a)));
+    let share = |series: &Series| if all > 0.0 { format!("{:.1} %", 100.0 * median(series) / all) } else { "-".into() };
+    rows.extend(kernels.iter().map(|series| cells(&series.name, series, &share(series))));
+    rows.extend(report.host.iter().map(|series| cells(&format!("host: {}", series.name), series, "")));
+    text.push_str(&aligned(&rows));
+    let intervals = report.host.first().and_then(Series::median).map_or(0.0, |median| median.confidence);
+    let Effort { repeat, warmup, .. } = report.effort;
+    // Text that cannot be written to a string does not exist.
+    let _ = writeln!(text, "\n{repeat} repeats after {warmup}; intervals of the median at {:.1} %", 100.0 * intervals);
+    if intervals < CONFIDENCE {
+        let _ = writeln!(text, "too few repeats for {:.0} %", 100.0 * CONFIDENCE);
+    }
+    if let Some(rate) = report.rate() {
+        let [value, low, high] = [rate.value, rate.low, rate.high].map(significant);
+        let _ = writeln!(text, "{value} Msamples/s ({low} to {high})");
+    }
+    let megabytes = |bytes: u64| significant(bytes as f64 * 1e-6);
+    let _ = write!(text, "memory: buffers {} MB", megabytes(report.device_bytes));
+    if let Some(peak) = report.peak_bytes {
+        let _ = write!(text, ", process {} MB at the peak", megabytes(peak));
+    }
+    text + "\n"
+}
+
+fn compared(comparison: &Comparison) -> String {
+    let mut rows = vec![row(["", "A [ms]", "B [ms]", "B/A", "INTERVAL", ""])];
+    let time = |ms: Option<f64>| ms.map_or("-".into(), significant);
+    for difference in &comparison.differences {
+        let [a, b] = difference.medians.map(time);
+        let ratio = difference.ratio.map_or("-".into(), |ratio| format!("{:.4}", ratio.value));
+        let interval = difference.ratio.map_or("-".into(), |ratio| format!("{:.4} to {:.4}", ratio.low, ratio.high));
+        rows.push(row([&difference.name, &a, &b, &ratio, &interval, verdict(difference)]));
+    }
+    let differing: Vec<&str> = comparison.differing().map(|difference| difference.name.as_str()).collect();
+    let confidence = significant(100.0 * comparison.confidence);
+    let sentence = match differing.is_empty() {
+        true => format!("no difference beyond noise, at {confidence} %\n"),
+        false => format!("beyond noise, at {confidence} %: {}\n", differing.join(", ")),
+    };
+    aligned(&rows) + "\n" + &sentence
+}
+
+fn verdict(difference: &Difference) -> &'static str {
+    match (difference.differs, difference.ratio, difference.medians) {
+        (false, ..) => "",
+        (true, Some(ratio), _) if ratio.value > 1.0 => "slower",
+        (true, Some(_), _) => "faster",
+        (true, None, [Some(_), _]) => "only in A",
+        (true, None, _) => "only in B",
+    }
+}
