@@ -13,7 +13,7 @@ use translucent::{
 
 /// Runs `test` on a validated device; with the device destroyed, validation must have found nothing.
 fn with_device(staging: bool, test: impl FnOnce(&Device)) {
-    let options = DeviceOptions { validation: true, staging, ..Default::default() };
+    let options = DeviceOptions { validation: true, profiling: true, staging, ..Default::default() };
     let device = Device::open(&options).expect("a device with the validation layer");
     let log = device.validation_log();
     test(&device);
@@ -146,6 +146,8 @@ fn dispatches_happen_in_order_with_their_constants() {
         assert!(scopes.iter().zip(0..).all(|(scope, i)| scope.kernel == "module" && scope.step.sample_index == i));
         assert!(scopes.iter().all(|scope| scope.begin <= scope.end));
         assert!(scopes.windows(2).all(|pair| pair[0].end <= pair[1].begin));
+        // Between submission and end, but for a nanosecond of rounding.
+        assert!(scopes.iter().all(|scope| scope.begin >= -1.0 && scope.end <= timing.ended + 1.0), "{timing:?}");
     });
 }
 
