@@ -15,13 +15,13 @@ pub use report::{Report, Series};
 
 use crate::{
     Error, Result,
-    gpu::Device,
+    gpu::{Device, Executable, Statistic},
     profile::{Span, Track},
     render::{Renderer, spirv_hash},
     scene::Scene,
     settings::Settings,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 use std::time::Instant;
 
 /// Of every interval of a median.
@@ -83,19 +83,35 @@ pub fn run(
         timeline.clear();
         progress(done + 1);
     }
+    report.executables = executables(&renderer)?;
     report.device_bytes = renderer.buffers().iter().map(|(_, bytes)| bytes).sum();
     report.peak_bytes = peak_bytes();
     Ok(report)
 }
 
 /// What made the numbers; it may differ between runs that are compared.
-fn about(device: &Device) -> serde_json::Value {
+fn about(device: &Device) -> Value {
     let info = device.info();
     json!({
         "version": env!("CARGO_PKG_VERSION"), "spirvHash": spirv_hash(),
         "device": info.name, "driver": info.driver, "uuid": info.uuid, "kind": info.kind.to_string(),
         "vulkan": info.api_version,
     })
+}
+
+/// What the driver tells of each kernel, as JSON; null where it tells nothing.
+fn executables(renderer: &Renderer) -> Result<Value> {
+    let statistic = |found: &Statistic| json!({"name": found.name, "value": found.value, "about": found.description});
+    let executable = |found: &Executable| {
+        json!({
+            "name": found.name, "about": found.description, "subgroup": found.subgroup,
+            "statistics": found.statistics.iter().map(statistic).collect::<Vec<_>>(),
+        })
+    };
+    let found = renderer.executables()?.into_iter().filter(|(_, list)| !list.is_empty());
+    let named = found.map(|(stem, list)| (stem.to_string(), list.iter().map(executable).collect()));
+    let named: serde_json::Map<String, Value> = named.collect();
+    Ok(if named.is_empty() { Value::Null } else { named.into() })
 }
 
 /// The host's spans until the first submission of samples ended: name and milliseconds, in order of their beginnings.

@@ -22,6 +22,8 @@ pub struct Report {
     pub host: Vec<Series>,
     /// Time on the device, none where it has no timestamps.
     pub kernels: Vec<Series>,
+    /// What the driver tells of the compiled kernels, by name; null where it tells nothing.
+    pub executables: Value,
     /// Of all buffers.
     pub device_bytes: u64,
     /// Most memory that the process had, where the system tells. On a software driver that is the device's as well.
@@ -73,6 +75,7 @@ impl Report {
             start_up: vec![],
             host: vec![],
             kernels: vec![],
+            executables: Value::Null,
             device_bytes: 0,
             peak_bytes: None,
         }
@@ -114,6 +117,7 @@ impl Report {
                 .collect::<serde_json::Map<_, _>>(),
             "host": series(&self.host),
             "kernels": series(&self.kernels),
+            "executables": self.executables,
             "megasamplesPerSecond": rate.map(|rate| json!({
                 "median": rate.value, "interval": [rate.low, rate.high], "confidence": rate.confidence,
             })),
@@ -147,6 +151,7 @@ impl Report {
             start_up: start_up.map(|(name, ms)| Some((name.clone(), ms.as_f64()?))).collect::<Option<_>>()?,
             host: series("host")?,
             kernels: series("kernels")?,
+            executables: value["executables"].clone(),
             device_bytes: value["memory"]["deviceBytes"].as_u64()?,
             peak_bytes: value["memory"]["peakBytes"].as_u64(),
         })

@@ -38,7 +38,8 @@ pub struct DeviceOptions {
     /// Most bytes of one buffer, where that is less than what the device binds.
     pub buffer_bytes: Option<u64>,
     /// Enables what profiles make use of, where the device has it: VK_EXT_calibrated_timestamps, which puts the device's
-    /// work on the host's clock. Timestamps themselves need nothing.
+    /// work on the host's clock, and VK_KHR_pipeline_executable_properties ([`Kernel::executables`](super::Kernel::executables)).
+    /// Timestamps themselves need nothing.
     pub profiling: bool,
 }
 
@@ -294,7 +295,8 @@ impl Handles {
         }
         let mut requirements = Requirements::new();
         let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
-        let create = requirements.chain(create);
+        let mut executables = Default::default();
+        let create = available.chain(requirements.chain(create), &mut executables);
         // SAFETY: the physical device is of this instance and has the features; all pointers outlive the call.
         let device = unsafe { instance.raw.create_device(physical, &create, None) }.during("create the device")?;
         // SAFETY: the device was made with one queue of this family.

@@ -24,7 +24,7 @@ pub(super) struct LayoutObjects {
     set: vk::DescriptorSetLayout,
     // Stands in the slots that a scene does not need; no kernel may mention those.
     absent: Option<Arc<BufferMemory>>,
-    handles: Arc<Handles>,
+    pub handles: Arc<Handles>,
 }
 
 impl Layout {
@@ -217,7 +217,12 @@ impl Kernel {
             .module(module)
             .name(c"main")
             .specialization_info(&specialization);
-        let create = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.objects.pipeline)];
+        let flags = match handles.profiling.executables {
+            Some(_) => vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,
+            None => vk::PipelineCreateFlags::empty(),
+        };
+        let layout_handle = layout.objects.pipeline;
+        let create = [vk::ComputePipelineCreateInfo::default().flags(flags).stage(stage).layout(layout_handle)];
         // SAFETY: module and layout are alive, all pointers outlive the call. A pipeline needs its module no longer.
         let pipeline = unsafe {
             let made = handles.device.create_compute_pipelines(handles.pipeline_cache, &create, None);

@@ -2,7 +2,7 @@
 //! [`DeviceOptions::profiling`](super::DeviceOptions::profiling).
 
 use super::{clock::Moment, device::Handles, instance::Instance};
-use ash::{ext::calibrated_timestamps, vk};
+use ash::{ext::calibrated_timestamps, khr::pipeline_executable_properties, vk};
 use std::{ffi::CStr, time::Instant};
 
 /// How often the clocks are compared at a time; the comparison that took least counts.
@@ -12,6 +12,7 @@ const COMPARISONS: u32 = 4;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Available {
     calibrated: bool,
+    executables: bool,
 }
 
 impl Available {
@@ -26,12 +27,34 @@ impl Available {
             let domains = unsafe { functions.get_physical_device_calibrateable_time_domains(physical) };
             domains.unwrap_or_default().contains(&vk::TimeDomainEXT::DEVICE)
         };
-        Available { calibrated: named(calibrated_timestamps::NAME) && ticks() }
+        let info = || {
+            let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+            let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut executables);
+            // SAFETY: the device has the extension, and speaks Vulkan 1.3.
+            unsafe { instance.raw.get_physical_device_features2(physical, &mut chain) };
+            executables.pipeline_executable_info != vk::FALSE
+        };
+        Available {
+            calibrated: named(calibrated_timestamps::NAME) && ticks(),
+            executables: named(pipeline_executable_properties::NAME) && info(),
+        }
     }
 
     /// The names to enable.
     pub fn names(&self) -> Vec<&'static CStr> {
-        self.calibrated.then_some(calibrated_timestamps::NAME).into_iter().collect()
+        let extensions =
+            [(self.calibrated, calibrated_timestamps::NAME), (self.executables, pipeline_executable_properties::NAME)];
+        extensions.into_iter().filter_map(|(there, name)| there.then_some(name)).collect()
+    }
+
+    /// `create` with the features to enable chained to it.
+    pub fn chain<'a>(
+        &self,
+        create: vk::DeviceCreateInfo<'a>,
+        executables: &'a mut vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR<'static>,
+    ) -> vk::DeviceCreateInfo<'a> {
+        executables.pipeline_executable_info = vk::TRUE;
+        if self.executables { create.push_next(executables) } else { create }
     }
 }
 
@@ -39,12 +62,15 @@ impl Available {
 #[derive(Default)]
 pub(super) struct Profiling {
     calibrated: Option<calibrated_timestamps::Device>,
+    pub executables: Option<pipeline_executable_properties::Device>,
 }
 
 impl Profiling {
     pub fn new(available: Available, instance: &ash::Instance, device: &ash::Device) -> Profiling {
-        let calibrated = available.calibrated.then(|| calibrated_timestamps::Device::new(instance, device));
-        Profiling { calibrated }
+        Profiling {
+            calibrated: available.calibrated.then(|| calibrated_timestamps::Device::new(instance, device)),
+            executables: available.executables.then(|| pipeline_executable_properties::Device::new(instance, device)),
+        }
     }
 }
 

@@ -28,10 +28,16 @@
 //! Without a timeline nothing is timed: no query pool is made and no timestamp written. With one, each dispatch writes
 //! two timestamps. Dispatches follow one another anyway, each after a barrier, so they are not held up by them.
 //!
+//! With the cargo feature `tracy` every timeline is also sent to the profiler Tracy while it grows: the host's spans as zones of
+//! their thread, dispatches as those of a device on the host's clock. [`Timeline::new`] starts its client, which waits for
+//! a viewer of Tracy's on a port of its own.
+//!
 //! On a software driver a kernel's time is wall time of the processor's cores, and means something while they are idle.
 
 mod kernels;
 mod trace;
+#[cfg(feature = "tracy")]
+mod tracy;
 
 pub use kernels::KernelTimes;
 
@@ -80,6 +86,8 @@ pub struct Work {
 pub struct Timeline {
     epoch: Instant,
     noted: Arc<Mutex<Noted>>,
+    #[cfg(feature = "tracy")]
+    tracy: tracy::Stream,
 }
 
 #[derive(Default)]
@@ -91,13 +99,25 @@ struct Noted {
 impl Timeline {
     /// An empty one, whose time begins now.
     pub fn new() -> Timeline {
-        Timeline { epoch: Instant::now(), noted: Arc::default() }
+        Timeline {
+            epoch: Instant::now(),
+            noted: Arc::default(),
+            // Its clock begins with the timeline's.
+            #[cfg(feature = "tracy")]
+            tracy: tracy::Stream::new(),
+        }
     }
 
     /// Begins a span of the host's that ends when the value is dropped. Spans of one thread are nested.
     #[must_use = "it ends when it is dropped"]
     pub fn begin(&self, name: &'static str) -> Open {
-        Open { timeline: self.clone(), name, begin: self.at(Instant::now()) }
+        Open {
+            timeline: self.clone(),
+            name,
+            begin: self.at(Instant::now()),
+            #[cfg(feature = "tracy")]
+            _zone: self.tracy.zone(name),
+        }
     }
 
     /// Every span so far, in order of their ends.
@@ -135,6 +155,8 @@ impl Timeline {
     /// Notes spans whose places are known up to `deviation` (ns).
     pub(crate) fn note(&self, spans: impl IntoIterator<Item = Span>, deviation: f64) {
         let mut noted = self.noted();
+        #[cfg(feature = "tracy")]
+        let spans = spans.into_iter().inspect(|span| self.tracy.note(span));
         noted.spans.extend(spans);
         noted.deviation = noted.deviation.max(deviation);
     }
@@ -168,11 +190,13 @@ pub struct Open {
     timeline: Timeline,
     name: &'static str,
     begin: f64,
+    #[cfg(feature = "tracy")]
+    _zone: tracy_client::Span,
 }
 
 impl Drop for Open {
     fn drop(&mut self) {
-        let Open { timeline, name, begin } = self;
+        let Open { timeline, name, begin, .. } = self;
         let end = timeline.at(Instant::now());
         timeline.note([Span { track: Track::Host, name, begin: *begin, end, work: None }], 0.0);
     }

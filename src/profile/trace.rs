@@ -62,5 +62,5 @@ fn category(track: Track) -> &'static str {
 }
 
 fn microseconds(nanoseconds: f64) -> f64 {
-    nanoseconds * 1e-3
+    nanoseconds / 1e3
 }

@@ -71,7 +71,7 @@ impl Render {
         }
         let output = self.output()?;
         let stop = stop_on_interrupt()?;
-        let timeline = (!self.profile.is_empty()).then(Timeline::new);
+        let timeline = (!self.profile.is_empty() || cfg!(feature = "tracy")).then(Timeline::new);
         let (scene, warnings) = self.scene.load(timeline.clone()).map_err(Failure::while_reading)?;
         warnings.iter().for_each(|warning| self.warn(warning));
         let profiling = timeline.is_some();
@@ -113,7 +113,7 @@ impl Render {
             "{}: {width}x{height}, {samples} samples, {seconds:.2} s, {rate:.3} Msamples/s{note}\n",
             output.display()
         ))?;
-        if let Some(timeline) = &timeline {
+        if let Some(timeline) = timeline.as_ref().filter(|_| !self.profile.is_empty()) {
             profile::write(timeline, &device, &self.profile)?;
             print(&profile::table(timeline))?;
         }

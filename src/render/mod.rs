@@ -55,8 +55,8 @@ macro_rules! kernels {
                 },)* })
             }
 
-            fn stems(&self) -> Vec<&'static str> {
-                [$(&self.$stem,)*].into_iter().flatten().map(Kernel::stem).collect()
+            fn made(&self) -> impl Iterator<Item = &Kernel> {
+                [$(&self.$stem,)*].into_iter().flatten()
             }
         }
 
@@ -230,7 +230,7 @@ impl Renderer {
 
     /// Stems of the kernels that were made.
     pub fn kernels(&self) -> Vec<&'static str> {
-        self.kernels.stems()
+        self.kernels.made().map(Kernel::stem).collect()
     }
 
     /// What kernels read, but for the geometry.

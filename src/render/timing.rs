@@ -2,13 +2,22 @@
 
 use super::{Renderer, assemble};
 use crate::{
-    gpu::{Recorder, Scope},
+    error::Result,
+    gpu::{Executable, Recorder, Scope},
     profile::{Span, Track, Work},
 };
 use serde_json::{Value, json};
 use std::iter::once;
 
 impl Renderer {
+    /// What the driver tells of each kernel, by stem; see [`Kernel::executables`](crate::gpu::Kernel::executables).
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`](crate::Error::Vulkan).
+    pub fn executables(&self) -> Result<Vec<(&'static str, Vec<Executable>)>> {
+        self.kernels.made().map(|kernel| Ok((kernel.stem(), kernel.executables()?))).collect()
+    }
+
     /// What two renders of `samples` samples must agree in to be the same work.
     pub(crate) fn work(&self, samples: u32) -> Value {
         let view = self.prepared.view;

@@ -42,6 +42,7 @@ fn synthetic(random: &mut Random, repeat: usize, factor: impl Fn(&str) -> f64) -
         start_up: vec![("load".into(), 12.5)],
         host: vec![series("render", random.times(repeat, 50.0))],
         kernels,
+        executables: Value::Null,
         device_bytes: 1 << 20,
         peak_bytes: None,
     }
