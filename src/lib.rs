@@ -75,6 +75,7 @@
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
 //! | [`bench`] | all of these | fixed work, timed again and again, and compared |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
+//! | [`verify`] | all of these | single kernels on a device beside their twins |
 //!
 //! Unsafe code is denied outside of `gpu`, but for [`Renderer::record`], whose command buffer is the caller's. The C
 //! interface is a package of its own, `src/capi`, which sees this public interface alone; its header is made of it.
@@ -105,6 +106,7 @@ pub mod scene;
 pub mod settings;
 pub mod shared;
 pub mod table;
+pub mod verify;
 
 pub use ash;
 pub use error::{Error, Result};

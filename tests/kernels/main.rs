@@ -22,115 +22,30 @@ mod watertight;
 
 use bytemuck::Pod;
 use glam::{UVec4, Vec3};
-use std::{
-    collections::HashMap,
-    sync::{Mutex, MutexGuard, OnceLock},
-};
+use std::sync::{Mutex, MutexGuard, OnceLock};
 use translucent::{
     Device, DeviceOptions, Scene, Settings,
-    gpu::{Bindings, Buffer, Kernel, Layout, Location, Recorder, download, upload},
     prepare::{Prepared, prepare},
     reference::Inputs,
-    render::SPIRV,
-    shared::{Features, Slot, Step, glsl},
+    shared::{Slot, Step, glsl},
+    verify::{Bench, Loaded},
 };
 
-/// The device that all tests share, one test at a time, and the kernels made on it.
-pub struct Bench {
-    pub device: Device,
-    layout: Layout,
-    recorder: Recorder,
-    kernels: HashMap<(&'static str, Features), Kernel>,
-}
-
+/// The bench that all tests share, one test at a time.
 pub fn bench() -> MutexGuard<'static, Bench> {
     static BENCH: OnceLock<Mutex<Bench>> = OnceLock::new();
     let make = || {
         let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
         let device = Device::open(&options).expect("a Vulkan device and the validation layer");
-        let layout = Layout::new(&device).expect("layout");
-        let recorder = Recorder::new(&device).expect("recorder");
-        Mutex::new(Bench { device, layout, recorder, kernels: HashMap::new() })
+        Mutex::new(Bench::new(&device).expect("bench"))
     };
     BENCH.get_or_init(make).lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-impl Bench {
-    /// What kernels read of `inputs`, and `buffers`, on the device.
-    pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Loaded {
-        let fixed: [(Slot, &[u8]); 19] = [
-            (Slot::Views, bytemuck::bytes_of(inputs.view)),
-            (Slot::Nodes, bytemuck::cast_slice(nodes)),
-            (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
-            (Slot::Shadings, bytemuck::cast_slice(inputs.shadings)),
-            (Slot::Materials, bytemuck::cast_slice(inputs.materials)),
-            (Slot::Lights, bytemuck::cast_slice(inputs.lights)),
-            (Slot::Emitters, bytemuck::cast_slice(inputs.emitters)),
-            (Slot::EmitterCdf, bytemuck::cast_slice(inputs.emitter_cdf)),
-            (Slot::Boundaries, bytemuck::cast_slice(inputs.boundaries)),
-            (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
-            (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),
-            (Slot::Counters, &[0; 4]),
-            (Slot::Texels, bytemuck::cast_slice(inputs.texels)),
-            (Slot::Textures, bytemuck::cast_slice(inputs.textures)),
-            (Slot::Coordinates, bytemuck::cast_slice(inputs.coordinates)),
-            (Slot::Profiles, bytemuck::cast_slice(inputs.profiles)),
-            (Slot::Thickness, bytemuck::cast_slice(inputs.thickness)),
-            (Slot::Balances, bytemuck::cast_slice(inputs.balances)),
-            (Slot::Mixtures, bytemuck::cast_slice(inputs.mixtures)),
-        ];
-        let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
-        let make = |(slot, data): (Slot, &[u8])| {
-            let buffer = Buffer::new(&self.device, slot.name(), data.len() as u64, Location::Device).expect("buffer");
-            upload(&self.device, &buffer, data).expect("upload");
-            (slot, buffer)
-        };
-        let buffers: Vec<_> = given.map(make).collect();
-        let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
-        let bindings = Bindings::new(&self.layout, &bound).expect("bindings");
-        Loaded { features: inputs.features, bindings, buffers }
-    }
-
-    /// Runs one kernel once.
-    pub fn dispatch(&mut self, stem: &'static str, loaded: &Loaded, step: &Step) {
-        let Bench { layout, recorder, kernels, .. } = self;
-        let kernel = kernels.entry((stem, loaded.features)).or_insert_with(|| {
-            let (_, spirv) = SPIRV.iter().find(|(name, _)| *name == stem).expect("the kernel exists");
-            Kernel::new(layout, stem, spirv, &loaded.features, 64).expect("kernel")
-        });
-        recorder.begin().expect("begin");
-        recorder.dispatch(kernel, &loaded.bindings, step.pixel_count, step);
-        recorder.submit_and_wait().expect("submit");
-    }
-
-    pub fn write<T: Pod>(&self, loaded: &Loaded, slot: Slot, data: &[T]) {
-        upload(&self.device, loaded.buffer(slot), bytemuck::cast_slice(data)).expect("upload");
-    }
-
-    pub fn read<T: Pod>(&self, loaded: &Loaded, slot: Slot) -> Vec<T> {
-        let buffer = loaded.buffer(slot);
-        bytemuck::pod_collect_to_vec(&download(&self.device, buffer, buffer.bytes()).expect("download"))
-    }
-
-    /// Validation must have had nothing to say.
-    pub fn check(&self) {
-        let messages = self.device.validation_messages();
-        assert!(messages.is_empty(), "{messages:#?}");
-    }
-}
-
-/// Buffers on the device, for kernels of some features.
-pub struct Loaded {
-    features: Features,
-    bindings: Bindings,
-    buffers: Vec<(Slot, Buffer)>,
-}
-
-impl Loaded {
-    fn buffer(&self, slot: Slot) -> &Buffer {
-        let (_, buffer) = self.buffers.iter().find(|(s, _)| *s == slot).expect("the slot was bound");
-        buffer
-    }
+/// Validation must have had nothing to say.
+pub fn check(bench: &Bench) {
+    let messages = bench.device.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
 }
 
 /// A scene with what kernels read of it.
@@ -160,15 +75,14 @@ pub struct Outputs(Loaded);
 
 impl Outputs {
     pub fn get<T: Pod>(&self, slot: Slot) -> Vec<T> {
-        bench().read(&self.0, slot)
+        bench().read(&self.0, slot).expect("read")
     }
 }
 
 pub fn run(stem: &'static str, inputs: &Inputs, nodes: &[UVec4], step: &Step, buffers: &[(Slot, &[u8])]) -> Outputs {
     let mut bench = bench();
-    let loaded = bench.load(inputs, nodes, buffers);
-    bench.dispatch(stem, &loaded, step);
-    bench.check();
+    let loaded = bench.run(stem, inputs, nodes, step, buffers).expect("run");
+    check(&bench);
     Outputs(loaded)
 }
 
@@ -183,14 +97,12 @@ pub fn evaluate(
     numbers: &[Vec3],
 ) -> Vec<Vec3> {
     let mut bench = bench();
-    let Bench { layout, kernels, .. } = &mut *bench;
-    let make = || Kernel::new(layout, stem, &compile(source), &inputs.features, 64).expect("kernel");
-    kernels.entry((stem, inputs.features)).or_insert_with(make);
-    let loaded = bench.load(inputs, nodes, &[(Slot::BatchSums, bytemuck::cast_slice(numbers))]);
-    let step = Step { pixel_count: numbers.len() as u32, ray_begin: function, ..Step::default() };
-    bench.dispatch(stem, &loaded, &step);
-    bench.check();
-    bench.read(&loaded, Slot::BatchSums)
+    if bench.module(stem).is_none() {
+        bench.replace(stem, compile(source));
+    }
+    let found = bench.evaluate(stem, inputs, nodes, function, numbers).expect("evaluate");
+    check(&bench);
+    found
 }
 
 /// SPIR-V of GLSL that may include what kernels do.

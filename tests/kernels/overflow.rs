@@ -1,7 +1,7 @@
 //! Probes with more hits than a list holds: which are kept, and what they weigh.
 
 use crate::{
-    Case, assert_close, bench,
+    Case, assert_close, bench, check,
     scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec3};
@@ -67,22 +67,24 @@ fn long_lists_are_real_sorted_and_drawn_anew_for_each_sample() {
         })
         .collect();
     let mut bench = bench();
-    let loaded = bench.load(
-        &inputs,
-        &case.scene.nodes,
-        &[
-            (Slot::Surfaces, bytemuck::cast_slice(&surfaces.repeat(BATCHES as usize))),
-            (Slot::Probes, bytemuck::cast_slice(&probes)),
-            (Slot::HitLists, &vec![0; PIXELS as usize * size_of::<Hits>()]),
-        ],
-    );
+    let loaded = bench
+        .load(
+            &inputs,
+            &case.scene.nodes,
+            &[
+                (Slot::Surfaces, bytemuck::cast_slice(&surfaces.repeat(BATCHES as usize))),
+                (Slot::Probes, bytemuck::cast_slice(&probes)),
+                (Slot::HitLists, &vec![0; PIXELS as usize * size_of::<Hits>()]),
+            ],
+        )
+        .expect("load");
     // How often each hit is kept, in samples of one batch.
     let samples = 200;
     let mut kept = vec![[0u32; SHEETS as usize]; PIXELS as usize];
     for number in 0..samples {
         let step = step(&inputs, number * BATCHES + 3);
-        bench.dispatch("reproject", &loaded, &step);
-        let lists: Vec<Hits> = bench.read(&loaded, Slot::HitLists);
+        bench.dispatch("reproject", &loaded, &step).expect("dispatch");
+        let lists: Vec<Hits> = bench.read(&loaded, Slot::HitLists).expect("read");
         for (pixel, found) in lists.iter().enumerate() {
             let twin = reproject(&inputs, &step, pixel as u32, &surfaces[pixel], &probes[pixel]);
             assert_eq!((found.count, twin.count), (SHEETS, SHEETS));
@@ -94,7 +96,7 @@ fn long_lists_are_real_sorted_and_drawn_anew_for_each_sample() {
             }
         }
     }
-    bench.check();
+    check(&bench);
     // Pearson's statistic of each pixel over the variance of a choice without replacement has 19 degrees of freedom; the
     // sum has 1216 and the standard deviation 49. Five of them happen by chance once in a million. Were all samples of
     // the batch to decide alike, the sum would be 200 times as large.

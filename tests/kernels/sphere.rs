@@ -2,7 +2,7 @@
 //! host meets them with the sphere in f64, and the device weighs and lights the hits on tangent triangles. Nothing casts
 //! a shadow. Under uniform light every point shows the profile's mass within 2R, times Ft(wo).
 
-use crate::{Bench, Loaded, bench, common::sphere::*, common::*};
+use crate::{bench, check, common::sphere::*, common::*};
 use glam::{DVec3, UVec4, Vec2, Vec3, dvec3};
 use translucent::{
     Normalisation::Energy,
@@ -12,6 +12,7 @@ use translucent::{
         step,
     },
     shared::*,
+    verify::{Bench, Loaded},
 };
 
 /// A BVH node without children.
@@ -66,14 +67,14 @@ impl Disk {
             (Slot::HitLists, &vec![0; pixels * size_of::<Hits>()]),
             (Slot::RunningSums, &vec![0; pixels * size_of::<Sums>()]),
         ];
-        bench.load(&world.inputs(), &NOTHING, &buffers)
+        bench.load(&world.inputs(), &NOTHING, &buffers).expect("load")
     }
 
     /// One sample of every pixel; returns the number of hits of each.
     fn add_sample(&self, bench: &mut Bench, loaded: &Loaded, sample_index: u32) -> Vec<u32> {
         let step = step(&self.world.inputs(), sample_index, 0..1, 0..1);
-        bench.dispatch("sample", loaded, &step);
-        let probes: Vec<Probe> = bench.read(loaded, Slot::Probes);
+        bench.dispatch("sample", loaded, &step).expect("dispatch");
+        let probes: Vec<Probe> = bench.read(loaded, Slot::Probes).expect("read");
         let (mut triangles, mut shadings) = (self.world.triangles.clone(), self.world.shadings.clone());
         let mut lists = vec![Hits::default(); probes.len()];
         for (pixel, (probe, hits)) in probes.iter().zip(&mut lists).enumerate() {
@@ -88,10 +89,10 @@ impl Disk {
                 shadings.push(Shading { normal0: normal, normal1: normal, normal2: normal, material });
             }
         }
-        bench.write(loaded, Slot::Triangles, &triangles);
-        bench.write(loaded, Slot::Shadings, &shadings);
-        bench.write(loaded, Slot::HitLists, &lists);
-        bench.dispatch("accumulate", loaded, &step);
+        bench.write(loaded, Slot::Triangles, &triangles).expect("write");
+        bench.write(loaded, Slot::Shadings, &shadings).expect("write");
+        bench.write(loaded, Slot::HitLists, &lists).expect("write");
+        bench.dispatch("accumulate", loaded, &step).expect("dispatch");
         lists.iter().map(|hits| hits.count).collect()
     }
 
@@ -102,8 +103,8 @@ impl Disk {
         for sample_index in 0..samples {
             self.add_sample(&mut bench, &loaded, sample_index);
         }
-        bench.check();
-        let sums: Vec<Sums> = bench.read(&loaded, Slot::RunningSums);
+        check(&bench);
+        let sums: Vec<Sums> = bench.read(&loaded, Slot::RunningSums).expect("read");
         assert!(sums.iter().all(|s| s.samples == samples && s.covered == samples && s.invalid == 0));
         let inputs = self.world.inputs();
         let estimate = |(case, sums): (usize, &[Sums])| {
@@ -189,9 +190,9 @@ fn weights_are_bounded() {
         let mut bench = bench();
         let loaded = disk.load(&bench);
         for sample_index in 0..24 {
-            bench.write(&loaded, Slot::RunningSums, &vec![Sums::default(); disk.pixels() as usize]);
+            bench.write(&loaded, Slot::RunningSums, &vec![Sums::default(); disk.pixels() as usize]).expect("write");
             let counts = disk.add_sample(&mut bench, &loaded, sample_index);
-            let sums: Vec<Sums> = bench.read(&loaded, Slot::RunningSums);
+            let sums: Vec<Sums> = bench.read(&loaded, Slot::RunningSums).expect("read");
             for (pixel, (sums, count)) in sums.iter().zip(counts).enumerate() {
                 if count == 0 {
                     assert_eq!(sums.subsurface, Vec3::ZERO);
@@ -208,7 +209,7 @@ fn weights_are_bounded() {
                 largest = largest.max(share);
             }
         }
-        bench.check();
+        check(&bench);
     }
     println!("largest weight over its bound {largest:.3}");
     assert!(largest > 0.1, "the bound would be void: {largest}");

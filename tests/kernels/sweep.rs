@@ -2,7 +2,7 @@
 //! infinite, or negative light, and all but a few agree with the twins.
 
 use crate::{
-    Case, bench,
+    Case, bench, check,
     scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -307,7 +307,7 @@ fn a_million_sets_through_every_kernel() {
             resolved.add(&what, gpu.subsurface + gpu.reflection, twin.subsurface + twin.reflection);
         }
     }
-    bench().check();
+    check(&bench());
     found.report("primary", 1e-3);
     drawn.report("sample", 1e-3);
     // A ray meets one of a world's 72 edges within rounding (2^-22) once in 1e5.

@@ -1,0 +1,235 @@
+//! One kernel at a time on a device: buffers made of inputs, a dispatch, and what it left.
+
+use crate::{
+    error::{Error, Result},
+    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
+    reference::Inputs,
+    render::SPIRV,
+    shared::{Features, Slot, Step, WORKGROUP},
+};
+use bytemuck::Pod;
+use glam::{UVec4, Vec3};
+use std::{borrow::Cow, collections::HashMap};
+
+/// A device, and kernels made on it of modules that can be replaced.
+pub struct Bench {
+    pub device: Device,
+    layout: Layout,
+    recorder: Recorder,
+    modules: HashMap<&'static str, Cow<'static, [u8]>>,
+    kernels: HashMap<(&'static str, Features), Kernel>,
+    /// How often each dispatch runs, from the same buffers; what does not always leave the same is in `unrepeatable`.
+    pub repeat: u32,
+    /// Kernels that left different bytes when they ran again.
+    pub unrepeatable: Vec<&'static str>,
+    /// Every dispatch since this was set to an empty list; none are kept without.
+    pub record: Option<Vec<Dispatch>>,
+}
+
+/// A dispatch, whole: what the driver was given, and what it made of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dispatch {
+    pub stem: &'static str,
+    pub spirv: Vec<u8>,
+    /// The specialization constants, but for number 0, the workgroup.
+    pub features: Features,
+    pub workgroup: u32,
+    /// The push constants; `pixel_count` invocations are asked for.
+    pub step: Step,
+    /// What the buffers held before.
+    pub before: Vec<(Slot, Vec<u8>)>,
+    /// What they held afterwards.
+    pub after: Vec<(Slot, Vec<u8>)>,
+}
+
+impl Bench {
+    /// A bench with the modules that the build made.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`], [`Error::Memory`].
+    pub fn new(device: &Device) -> Result<Bench> {
+        Ok(Bench {
+            device: device.clone(),
+            layout: Layout::new(device)?,
+            recorder: Recorder::new(device)?,
+            modules: SPIRV.iter().map(|&(stem, spirv)| (stem, Cow::Borrowed(spirv))).collect(),
+            kernels: HashMap::new(),
+            repeat: 1,
+            unrepeatable: vec![],
+            record: None,
+        })
+    }
+
+    /// The SPIR-V of a kernel.
+    pub fn module(&self, stem: &str) -> Option<&[u8]> {
+        self.modules.get(stem).map(AsRef::as_ref)
+    }
+
+    /// Uses other SPIR-V for a kernel from now on, or adds one. Like all SPIR-V that is given to a device it must be
+    /// valid.
+    pub fn replace(&mut self, stem: &'static str, spirv: impl Into<Cow<'static, [u8]>>) {
+        self.kernels.retain(|(made, _), _| *made != stem);
+        self.modules.insert(stem, spirv.into());
+    }
+
+    /// What kernels read of `inputs`, and `buffers`, on the device.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`], [`Error::Memory`].
+    pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Result<Loaded> {
+        let fixed: [(Slot, &[u8]); 19] = [
+            (Slot::Views, bytemuck::bytes_of(inputs.view)),
+            (Slot::Nodes, bytemuck::cast_slice(nodes)),
+            (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
+            (Slot::Shadings, bytemuck::cast_slice(inputs.shadings)),
+            (Slot::Materials, bytemuck::cast_slice(inputs.materials)),
+            (Slot::Lights, bytemuck::cast_slice(inputs.lights)),
+            (Slot::Emitters, bytemuck::cast_slice(inputs.emitters)),
+            (Slot::EmitterCdf, bytemuck::cast_slice(inputs.emitter_cdf)),
+            (Slot::Boundaries, bytemuck::cast_slice(inputs.boundaries)),
+            (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
+            (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),
+            (Slot::Counters, &[0; 4]),
+            (Slot::Texels, bytemuck::cast_slice(inputs.texels)),
+            (Slot::Textures, bytemuck::cast_slice(inputs.textures)),
+            (Slot::Coordinates, bytemuck::cast_slice(inputs.coordinates)),
+            (Slot::Profiles, bytemuck::cast_slice(inputs.profiles)),
+            (Slot::Thickness, bytemuck::cast_slice(inputs.thickness)),
+            (Slot::Balances, bytemuck::cast_slice(inputs.balances)),
+            (Slot::Mixtures, bytemuck::cast_slice(inputs.mixtures)),
+        ];
+        let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
+        let make = |(slot, data): (Slot, &[u8])| {
+            let buffer = Buffer::new(&self.device, slot.name(), data.len() as u64, Location::Device)?;
+            upload(&self.device, &buffer, data)?;
+            Ok((slot, buffer))
+        };
+        let buffers = given.map(make).collect::<Result<Vec<_>>>()?;
+        let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
+        let bindings = Bindings::new(&self.layout, &bound)?;
+        Ok(Loaded { features: inputs.features, bindings, buffers })
+    }
+
+    /// Runs one kernel, with `step.pixel_count` invocations.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a kernel that does not exist; [`Error::Vulkan`], [`Error::Memory`].
+    pub fn dispatch(&mut self, stem: &'static str, loaded: &Loaded, step: &Step) -> Result<()> {
+        let kernel = self.kernel(stem, &loaded.features)?;
+        if self.record.is_none() && self.repeat <= 1 {
+            return self.submit(&kernel, loaded, step);
+        }
+        let before = self.contents(loaded)?;
+        self.submit(&kernel, loaded, step)?;
+        let after = self.contents(loaded)?;
+        for _ in 1..self.repeat {
+            before.iter().try_for_each(|(slot, data)| upload(&self.device, loaded.buffer(*slot), data))?;
+            self.submit(&kernel, loaded, step)?;
+            if self.contents(loaded)? != after {
+                self.unrepeatable.push(stem);
+            }
+        }
+        let spirv = self.module(stem).unwrap_or_default().to_vec();
+        let (features, workgroup) = (loaded.features, WORKGROUP);
+        if let Some(record) = &mut self.record {
+            record.push(Dispatch { stem, spirv, features, workgroup, step: *step, before, after });
+        }
+        Ok(())
+    }
+
+    /// Loads, runs one kernel once, and returns the buffers as it left them.
+    ///
+    /// # Errors
+    /// As [`Bench::load`] and [`Bench::dispatch`].
+    pub fn run(
+        &mut self,
+        stem: &'static str,
+        inputs: &Inputs,
+        nodes: &[UVec4],
+        step: &Step,
+        buffers: &[(Slot, &[u8])],
+    ) -> Result<Loaded> {
+        let loaded = self.load(inputs, nodes, buffers)?;
+        self.dispatch(stem, &loaded, step)?;
+        Ok(loaded)
+    }
+
+    /// Runs a kernel over `numbers` in BatchSums and returns what it leaves there; `function` becomes `Step::ray_begin`,
+    /// by which such a kernel knows what to compute.
+    ///
+    /// # Errors
+    /// As [`Bench::run`].
+    pub fn evaluate(
+        &mut self,
+        stem: &'static str,
+        inputs: &Inputs,
+        nodes: &[UVec4],
+        function: u32,
+        numbers: &[Vec3],
+    ) -> Result<Vec<Vec3>> {
+        let step = Step { pixel_count: numbers.len() as u32, ray_begin: function, ..Step::default() };
+        let buffers: [(Slot, &[u8]); 1] = [(Slot::BatchSums, bytemuck::cast_slice(numbers))];
+        let loaded = self.run(stem, inputs, nodes, &step, &buffers)?;
+        self.read(&loaded, Slot::BatchSums)
+    }
+
+    /// Overwrites the start of a buffer.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`], [`Error::Memory`].
+    ///
+    /// # Panics
+    /// If the slot was not loaded or is shorter.
+    pub fn write<T: Pod>(&self, loaded: &Loaded, slot: Slot, data: &[T]) -> Result<()> {
+        upload(&self.device, loaded.buffer(slot), bytemuck::cast_slice(data))
+    }
+
+    /// What a buffer holds.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`], [`Error::Memory`].
+    ///
+    /// # Panics
+    /// If the slot was not loaded, or does not hold whole elements.
+    pub fn read<T: Pod>(&self, loaded: &Loaded, slot: Slot) -> Result<Vec<T>> {
+        let buffer = loaded.buffer(slot);
+        Ok(bytemuck::pod_collect_to_vec(&download(&self.device, buffer, buffer.bytes())?))
+    }
+
+    fn kernel(&mut self, stem: &'static str, features: &Features) -> Result<Kernel> {
+        if let Some(kernel) = self.kernels.get(&(stem, *features)) {
+            return Ok(kernel.clone());
+        }
+        let Some(spirv) = self.modules.get(stem) else {
+            return Err(Error::setting("kernel", format!("there is none called `{stem}`")));
+        };
+        let kernel = Kernel::new(&self.layout, stem, spirv, features, WORKGROUP)?;
+        self.kernels.insert((stem, *features), kernel.clone());
+        Ok(kernel)
+    }
+
+    fn submit(&mut self, kernel: &Kernel, loaded: &Loaded, step: &Step) -> Result<()> {
+        self.recorder.begin()?;
+        self.recorder.dispatch(kernel, &loaded.bindings, step.pixel_count, step);
+        self.recorder.submit_and_wait()
+    }
+
+    fn contents(&self, loaded: &Loaded) -> Result<Vec<(Slot, Vec<u8>)>> {
+        let content = |(slot, buffer): &(Slot, Buffer)| Ok((*slot, download(&self.device, buffer, buffer.bytes())?));
+        loaded.buffers.iter().map(content).collect()
+    }
+}
+
+/// Buffers on the device, for kernels of some features.
+pub struct Loaded {
+    features: Features,
+    bindings: Bindings,
+    buffers: Vec<(Slot, Buffer)>,
+}
+
+impl Loaded {
+    fn buffer(&self, slot: Slot) -> &Buffer {
+        let (_, buffer) = self.buffers.iter().find(|(s, _)| *s == slot).expect("the slot was bound");
+        buffer
+    }
+}
