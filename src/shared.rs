@@ -312,6 +312,93 @@ constants! {
     DIM_SINGLE_LIGHT: u32 = 18;
     /// Dimensions 20 and 21: point of an emitter for that point (a point per direction).
     DIM_SINGLE_EMITTER: u32 = 20;
+
+    /// Of `functions`: x y + z, x / y and sqrt |x|, for what the device's arithmetic is.
+    FUNCTION_ARITHMETIC: u32 = 0;
+    /// Of `functions`: dot, length and cross product.
+    FUNCTION_DOT: u32 = 1;
+    /// Of `functions`: `hash`.
+    FUNCTION_HASH: u32 = 2;
+    /// Of `functions`: `scramble`.
+    FUNCTION_SCRAMBLE: u32 = 3;
+    /// Of `functions`: `sobol1`.
+    FUNCTION_SOBOL: u32 = 4;
+    /// Of `functions`: `dimension_key` of `pixel_key`.
+    FUNCTION_KEY: u32 = 5;
+    /// Of `functions`: `random_point`.
+    FUNCTION_POINT: u32 = 6;
+    /// Of `functions`: `exp_`.
+    FUNCTION_EXP: u32 = 7;
+    /// Of `functions`: `log_`.
+    FUNCTION_LOG: u32 = 8;
+    /// Of `functions`: `log1p_`.
+    FUNCTION_LOG1P: u32 = 9;
+    /// Of `functions`: `one_minus_exp_over`.
+    FUNCTION_ONE_MINUS_EXP_OVER: u32 = 10;
+    /// Of `functions`: `cos_sin_2pi`.
+    FUNCTION_COS_SIN: u32 = 11;
+    /// Of `functions`: `atan2_`.
+    FUNCTION_ATAN2: u32 = 12;
+    /// Of `functions`: `orthonormal_basis`.
+    FUNCTION_BASIS: u32 = 13;
+    /// Of `functions`: `fresnel`.
+    FUNCTION_FRESNEL: u32 = 14;
+    /// Of `functions`: `crossing`.
+    FUNCTION_CROSSING: u32 = 15;
+    /// Of `functions`: `ggx_distribution` and `ggx_lambda`.
+    FUNCTION_GGX: u32 = 16;
+    /// Of `functions`: `draw_half_vector`.
+    FUNCTION_HALF_VECTOR: u32 = 17;
+    /// Of `functions`: `refracted`.
+    FUNCTION_REFRACTED: u32 = 18;
+    /// Of `functions`: `phase`.
+    FUNCTION_PHASE: u32 = 19;
+    /// Of `functions`: `draw_phase`.
+    FUNCTION_DRAW_PHASE: u32 = 20;
+    /// Of `functions`: `texture_at`, colour.
+    FUNCTION_TEXTURE: u32 = 21;
+    /// Of `functions`: `texture_at`, alpha.
+    FUNCTION_TEXTURE_ALPHA: u32 = 22;
+    /// Of `functions`: `delta_light`, irradiance.
+    FUNCTION_DELTA_LIGHT: u32 = 23;
+    /// Of `functions`: `delta_light`, direction.
+    FUNCTION_LIGHT_DIRECTION: u32 = 24;
+    /// Of `functions`: `environment_radiance`.
+    FUNCTION_ENVIRONMENT: u32 = 25;
+    /// Of `functions`: `environment_density`.
+    FUNCTION_ENVIRONMENT_DENSITY: u32 = 26;
+    /// Of `functions`: `draw_environment`.
+    FUNCTION_DRAW_ENVIRONMENT: u32 = 27;
+    /// Of `functions`: `draw_cosine`.
+    FUNCTION_DRAW_COSINE: u32 = 28;
+    /// Of `functions`: `draw_emitter`.
+    FUNCTION_DRAW_EMITTER: u32 = 29;
+    /// Of `functions`: `emitter_density` in `combined`.
+    FUNCTION_EMITTER_DENSITY: u32 = 30;
+    /// Of `functions`: `shape_shifted`.
+    FUNCTION_SHAPE: u32 = 31;
+    /// Of `functions`: `draw_radius` and `radial_density`.
+    FUNCTION_RADIUS: u32 = 32;
+    /// Of `functions`: `directional_value`.
+    FUNCTION_DIRECTIONAL: u32 = 33;
+    /// Of `functions`: `obliqueness`.
+    FUNCTION_OBLIQUENESS: u32 = 34;
+    /// Of `functions`: `pick_member`.
+    FUNCTION_PICK: u32 = 35;
+    /// Of `functions`: `technique_fractions`.
+    FUNCTION_FRACTIONS: u32 = 36;
+    /// Of `functions`: `seen`.
+    FUNCTION_SEEN: u32 = 37;
+    /// Of `functions`: `mixture_density` and `camera_ratio`.
+    FUNCTION_DENSITY: u32 = 38;
+    /// Of `functions`: `traverse` for the nearest hit.
+    FUNCTION_CLOSEST: u32 = 39;
+    /// Of `functions`: `traverse` for any hit.
+    FUNCTION_ANY: u32 = 40;
+    /// Of `functions`: `traverse` for all hits.
+    FUNCTION_ALL: u32 = 41;
+    /// Of `functions`: `compensated_add`.
+    FUNCTION_ADD: u32 = 42;
 }
 
 structs! {

@@ -25,6 +25,7 @@ pub mod resolve;
 pub mod rough;
 pub mod sample;
 pub mod single;
+pub mod strict;
 pub mod sums;
 pub mod texture;
 pub mod walk;

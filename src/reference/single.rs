@@ -88,7 +88,7 @@ pub fn phase(g: f64, cos: f64) -> f64 {
 }
 
 /// A direction with the density [`phase`] about the unit vector `d`.
-fn draw_phase(g: f64, d: DVec3, u: (f64, f64)) -> DVec3 {
+pub(crate) fn draw_phase(g: f64, d: DVec3, u: (f64, f64)) -> DVec3 {
     let k = 1.0 - g.abs();
     let below = k + 2.0 * g.abs() * u.0;
     let t = k * (1.0 - u.0) / below * (k * (1.0 + g.abs()) / below + k);

@@ -5,11 +5,14 @@ use crate::{
     gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
     reference::Inputs,
     render::SPIRV,
-    shared::{Features, Slot, Step, WORKGROUP},
+    shared::{Features, Shading, Slot, Step, WORKGROUP},
 };
 use bytemuck::Pod;
 use glam::{UVec4, Vec3};
 use std::{borrow::Cow, collections::HashMap};
+
+/// The SPIR-V of `functions`, a kernel that evaluates the functions which the others share. No renderer has it.
+pub const FUNCTIONS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/functions.spv"));
 
 /// A device, and kernels made on it of modules that can be replaced.
 pub struct Bench {
@@ -52,7 +55,7 @@ impl Bench {
             device: device.clone(),
             layout: Layout::new(device)?,
             recorder: Recorder::new(device)?,
-            modules: SPIRV.iter().map(|&(stem, spirv)| (stem, Cow::Borrowed(spirv))).collect(),
+            modules: built().collect(),
             kernels: HashMap::new(),
             repeat: 1,
             unrepeatable: vec![],
@@ -154,23 +157,35 @@ impl Bench {
         Ok(loaded)
     }
 
-    /// Runs a kernel over `numbers` in BatchSums and returns what it leaves there; `function` becomes `Step::ray_begin`,
-    /// by which such a kernel knows what to compute.
+    /// Values of a shared function, one of FUNCTION_*, at the arguments `x`; further ones are in `inputs.shadings`, and in
+    /// `buffers` where the function reads surfaces and probes.
     ///
     /// # Errors
     /// As [`Bench::run`].
     pub fn evaluate(
         &mut self,
-        stem: &'static str,
+        function: u32,
         inputs: &Inputs,
         nodes: &[UVec4],
-        function: u32,
-        numbers: &[Vec3],
+        x: &[Vec3],
+        buffers: &[(Slot, &[u8])],
     ) -> Result<Vec<Vec3>> {
-        let step = Step { pixel_count: numbers.len() as u32, ray_begin: function, ..Step::default() };
-        let buffers: [(Slot, &[u8]); 1] = [(Slot::BatchSums, bytemuck::cast_slice(numbers))];
-        let loaded = self.run(stem, inputs, nodes, &step, &buffers)?;
+        let step = Step { pixel_count: x.len() as u32, ray_begin: function, ..Step::default() };
+        // Every invocation reads its own.
+        let mut shadings = inputs.shadings.to_vec();
+        shadings.resize(shadings.len().max(x.len()), Shading::default());
+        let inputs = Inputs { shadings: &shadings, ..*inputs };
+        let buffers: Vec<_> =
+            [(Slot::BatchSums, bytemuck::cast_slice(x))].into_iter().chain(buffers.iter().copied()).collect();
+        let loaded = self.run("functions", &inputs, nodes, &step, &buffers)?;
         self.read(&loaded, Slot::BatchSums)
+    }
+
+    /// Uses the SPIR-V that the build made of a kernel again.
+    pub fn restore(&mut self, stem: &'static str) {
+        if let Some((_, spirv)) = built().find(|(built, _)| *built == stem) {
+            self.replace(stem, spirv);
+        }
     }
 
     /// Overwrites the start of a buffer.
@@ -218,6 +233,11 @@ impl Bench {
         let content = |(slot, buffer): &(Slot, Buffer)| Ok((*slot, download(&self.device, buffer, buffer.bytes())?));
         loaded.buffers.iter().map(content).collect()
     }
+}
+
+/// The modules that the build made.
+fn built() -> impl Iterator<Item = (&'static str, Cow<'static, [u8]>)> {
+    SPIRV.iter().copied().chain([("functions", FUNCTIONS)]).map(|(stem, spirv)| (stem, Cow::Borrowed(spirv)))
 }
 
 /// Buffers on the device, for kernels of some features.

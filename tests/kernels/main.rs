@@ -18,6 +18,7 @@ mod stages;
 mod steps;
 mod sweep;
 mod textures;
+mod verify;
 mod watertight;
 
 use bytemuck::Pod;
@@ -25,10 +26,9 @@ use glam::{UVec4, Vec3};
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use translucent::{
     Device, DeviceOptions, Scene, Settings,
-    prepare::{Prepared, prepare},
     reference::Inputs,
-    shared::{Slot, Step, glsl},
-    verify::{Bench, Loaded},
+    shared::{Slot, Step},
+    verify::{Bench, Case, Loaded},
 };
 
 /// The bench that all tests share, one test at a time.
@@ -49,25 +49,13 @@ pub fn check(bench: &Bench) {
 }
 
 /// A scene with what kernels read of it.
-pub struct Case {
-    pub scene: Scene,
-    pub prepared: Prepared,
+pub fn case(scene: Scene, settings: &Settings) -> Case {
+    Case::new("", scene, settings).expect("the settings fit the scene")
 }
 
-impl Case {
-    pub fn new(scene: Scene, settings: &Settings) -> Case {
-        let prepared = prepare(&scene, settings).expect("the settings fit the scene");
-        Case { scene, prepared }
-    }
-
-    pub fn inputs(&self) -> Inputs<'_> {
-        self.prepared.inputs(&self.scene)
-    }
-
-    /// Runs one kernel once and returns what `buffers` then hold.
-    pub fn run(&self, stem: &'static str, step: &Step, buffers: &[(Slot, &[u8])]) -> Outputs {
-        run(stem, &self.inputs(), &self.scene.nodes, step, buffers)
-    }
+/// Runs one kernel once on a case and returns what `buffers` then hold.
+pub fn run_case(case: &Case, stem: &'static str, step: &Step, buffers: &[(Slot, &[u8])]) -> Outputs {
+    run(stem, &case.inputs(), &case.scene.nodes, step, buffers)
 }
 
 /// Buffers after a dispatch.
@@ -86,41 +74,12 @@ pub fn run(stem: &'static str, inputs: &Inputs, nodes: &[UVec4], step: &Step, bu
     Outputs(loaded)
 }
 
-/// Runs a kernel that only a test has over `numbers` in BatchSums and returns what it leaves there. `source` is its GLSL,
-/// `function` the `step_.ray_begin` by which it may tell what to compute.
-pub fn evaluate(
-    stem: &'static str,
-    source: &str,
-    inputs: &Inputs,
-    nodes: &[UVec4],
-    function: u32,
-    numbers: &[Vec3],
-) -> Vec<Vec3> {
+/// Values of a shared function, one of FUNCTION_*, at the arguments `x`.
+pub fn evaluate(function: u32, inputs: &Inputs, nodes: &[UVec4], x: &[Vec3]) -> Vec<Vec3> {
     let mut bench = bench();
-    if bench.module(stem).is_none() {
-        bench.replace(stem, compile(source));
-    }
-    let found = bench.evaluate(stem, inputs, nodes, function, numbers).expect("evaluate");
+    let found = bench.evaluate(function, inputs, nodes, x, &[]).expect("evaluate");
     check(&bench);
     found
-}
-
-/// SPIR-V of GLSL that may include what kernels do.
-fn compile(source: &str) -> Vec<u8> {
-    let compiler = shaderc::Compiler::new().expect("shaderc starts");
-    let mut options = shaderc::CompileOptions::new().expect("shaderc starts");
-    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-    options.set_include_callback(|name, _, _, _| {
-        let content = match name {
-            "shared.glsl" => glsl(),
-            _ => std::fs::read_to_string(format!("{}/glsl/{name}", env!("CARGO_MANIFEST_DIR")))
-                .map_err(|error| error.to_string())?,
-        };
-        Ok(shaderc::ResolvedInclude { resolved_name: name.into(), content })
-    });
-    let compiled =
-        compiler.compile_into_spirv(source.trim_start(), shaderc::ShaderKind::Compute, "test", "main", Some(&options));
-    compiled.expect("the kernel compiles").as_binary_u8().to_vec()
 }
 
 /// Asserts that the relative `errors` of all items are within 1e-5 but for one in a thousand, and that none is not a number.

@@ -2,35 +2,17 @@
 
 use crate::common::World;
 use glam::Vec3;
-use translucent::reference::random::{hash, unit};
+use translucent::{
+    reference::random::{hash, unit},
+    shared::*,
+};
 
 /// Bound on the errors of every function here.
 const BOUND: f64 = 1.0 / (1 << 21) as f64;
 
-/// One invocation evaluates the function that `step_.ray_begin` names.
-const KERNEL: &str = r#"
-#version 460
-#include "shared.glsl"
-#include "math.glsl"
-BATCH_SUMS(read_write);
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= step_.pixel_count) return;
-    vec3 x = batch_sums[i];
-    vec2 y = vec2(0.0);
-    if (step_.ray_begin == 0) y.x = exp_(x.x);
-    if (step_.ray_begin == 1) y.x = log_(x.x);
-    if (step_.ray_begin == 2) y.x = log1p_(x.x);
-    if (step_.ray_begin == 3) y = cos_sin_2pi(x.x);
-    if (step_.ray_begin == 4) y.x = atan2_(x.y, x.x);
-    if (step_.ray_begin == 5) y.x = one_minus_exp_over(x.x);
-    batch_sums[i] = vec3(y, 0.0);
-}
-"#;
-
 /// The function's values at `x`, on the device.
 fn evaluate(function: u32, x: &[Vec3]) -> Vec<Vec3> {
-    crate::evaluate("math", KERNEL, &World::default().inputs(), &[], function, x)
+    crate::evaluate(function, &World::default().inputs(), &[], x)
 }
 
 /// 2^16 numbers in [0, 1), the k-th kind of them.
@@ -55,16 +37,16 @@ fn assert_relative(what: &str, x: &[Vec3], y: &[Vec3], truth: impl Fn(f64) -> f6
 #[test]
 fn exponential() {
     let x = arguments(numbers(0).map(|u| 174.0 * u - 86.5).chain(numbers(1).map(|u| u - 0.5)));
-    assert_relative("exp", &x, &evaluate(0, &x), f64::exp);
+    assert_relative("exp", &x, &evaluate(FUNCTION_EXP, &x), f64::exp);
     // Beyond the range: nothing, or infinity; never less than nothing, never not a number.
-    let far = evaluate(0, &arguments([-1e30, -88.0, -87.1, 89.0, 1e30].into_iter()));
+    let far = evaluate(FUNCTION_EXP, &arguments([-1e30, -88.0, -87.1, 89.0, 1e30].into_iter()));
     assert_eq!(far.iter().map(|y| y.x).collect::<Vec<_>>(), [0.0, 0.0, 0.0, f32::INFINITY, f32::INFINITY]);
 }
 
 #[test]
 fn one_minus_exponential() {
     let x = arguments(numbers(8).map(|u| 10f64.powf(32.0 * u - 30.0)).chain(numbers(9)).chain([1e30]));
-    assert_relative("(1 - exp(-x)) / x", &x, &evaluate(5, &x), |x| -f64::exp_m1(-x) / x);
+    assert_relative("(1 - exp(-x)) / x", &x, &evaluate(FUNCTION_ONE_MINUS_EXP_OVER, &x), |x| -f64::exp_m1(-x) / x);
 }
 
 #[test]
@@ -72,9 +54,9 @@ fn logarithms() {
     // Over all magnitudes, and near 1, where a driver's own log has no digits.
     let magnitudes = numbers(2).map(|u| 10f64.powf(70.0 * u - 37.0));
     let x = arguments(magnitudes.chain(numbers(3).map(|u| 1.0 + (u - 0.5) * 1e-3)).chain([1.0]));
-    assert_relative("log", &x, &evaluate(1, &x), f64::ln);
+    assert_relative("log", &x, &evaluate(FUNCTION_LOG, &x), f64::ln);
     let x = arguments(numbers(4).map(|u| 10f64.powf(28.0 * u - 20.0)).chain([0.0]));
-    assert_relative("log1p", &x, &evaluate(2, &x), f64::ln_1p);
+    assert_relative("log1p", &x, &evaluate(FUNCTION_LOG1P, &x), f64::ln_1p);
 }
 
 #[test]
@@ -84,7 +66,7 @@ fn circle() {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(x.x)).sin_cos();
         (f64::from(y.x) - cos).abs().max((f64::from(y.y) - sin).abs())
     };
-    let worst = x.iter().zip(&evaluate(3, &x)).map(error).fold(0.0, f64::max);
+    let worst = x.iter().zip(&evaluate(FUNCTION_COS_SIN, &x)).map(error).fold(0.0, f64::max);
     println!("cos, sin: {worst:.1e}");
     assert!(worst <= BOUND, "{worst:e}");
 
@@ -96,7 +78,7 @@ fn circle() {
         let truth = f64::from(x.y).atan2(f64::from(x.x));
         ((f64::from(y.x) - truth) / if truth == 0.0 { 1.0 } else { truth }).abs()
     };
-    let worst = x.iter().zip(&evaluate(4, &x)).map(error).fold(0.0, f64::max);
+    let worst = x.iter().zip(&evaluate(FUNCTION_ATAN2, &x)).map(error).fold(0.0, f64::max);
     println!("atan2: {worst:.1e}");
     assert!(worst <= BOUND, "{worst:e}");
 }

@@ -12,30 +12,8 @@ use translucent::{
         random::{hash, unit},
     },
     shared::*,
+    verify::profiles::directional_scale,
 };
-
-/// Each invocation evaluates one model: shape, density and radius, or the directional value.
-const KERNEL: &str = r#"
-#version 460
-#include "shared.glsl"
-#include "math.glsl"
-#include "profile.glsl"
-MATERIALS(readonly);
-SHADINGS(readonly);
-BATCH_SUMS(read_write);
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= step_.pixel_count) return;
-    vec3 x = batch_sums[i];
-    Shading directions = shadings[i];
-    Material m = materials[directions.material];
-    vec3 y = vec3(0.0);
-    if (step_.ray_begin == 0) y = shape_shifted(m, x.x * x.x, 0.0);
-    if (step_.ray_begin == 1) y = vec3(draw_radius(m, x.y, x.z), radial_density(m, x.x * x.x), 0.0);
-    if (step_.ray_begin == 2) y = directional_value(m, x, directions.normal0, directions.normal1, directions.normal2, 0.0);
-    batch_sums[i] = y;
-}
-"#;
 
 /// Materials of a model, and evaluations: 2^20 in all.
 const MATERIALS: u32 = 1 << 12;
@@ -97,9 +75,15 @@ impl Sweep {
         Sweep { world: World { features, materials, shadings, ..World::default() }, arguments }
     }
 
-    /// What the device gives for function `index` at `arguments`.
-    fn evaluate(&self, index: u32, arguments: &[Vec3]) -> Vec<Vec3> {
-        evaluate("models", KERNEL, &self.world.inputs(), &[], index, arguments)
+    /// What the device gives for a function at `arguments`.
+    fn evaluate(&self, function: u32, arguments: &[Vec3]) -> Vec<Vec3> {
+        evaluate(function, &self.world.inputs(), &[], arguments)
+    }
+
+    /// The model's shapes at the radii of `arguments`.
+    fn shapes(&self) -> Vec<Vec3> {
+        let unshifted: Vec<Vec3> = self.arguments.iter().map(|x| Vec3::new(x.x, 0.0, 0.0)).collect();
+        self.evaluate(FUNCTION_SHAPE, &unshifted)
     }
 
     fn material(&self, i: usize) -> &Material {
@@ -155,7 +139,7 @@ fn assert_valid(what: &str, values: &[Vec3], sweep: &Sweep) {
 fn radial_profiles_at_all_magnitudes() {
     for model in [MODEL_STANDARD, MODEL_BETTER, MODEL_BURLEY] {
         let sweep = Sweep::new(model);
-        let found = sweep.evaluate(0, &sweep.arguments);
+        let found = sweep.shapes();
         assert_valid(&format!("model {model}"), &found, &sweep);
         let errors = found.par_iter().enumerate().map(|(i, found)| {
             let (m, r) = (sweep.material(i), f64::from(sweep.arguments[i].x));
@@ -172,7 +156,7 @@ fn radial_profiles_at_all_magnitudes() {
 fn radii_at_all_magnitudes() {
     for model in [MODEL_STANDARD, MODEL_BETTER, MODEL_BURLEY] {
         let sweep = Sweep::new(model);
-        let found = sweep.evaluate(1, &sweep.arguments);
+        let found = sweep.evaluate(FUNCTION_RADIUS, &sweep.arguments);
         assert_valid(&format!("model {model}"), &found, &sweep);
         let errors = found.par_iter().enumerate().map(|(i, found)| {
             let (m, x) = (sweep.material(i), sweep.arguments[i].as_dvec3());
@@ -198,7 +182,7 @@ fn directional_dipole_at_all_magnitudes() {
         away * x.x
     });
     sweep.arguments = places.collect();
-    let found = sweep.evaluate(2, &sweep.arguments);
+    let found = sweep.evaluate(FUNCTION_DIRECTIONAL, &sweep.arguments);
     assert_valid("directional", &found, &sweep);
     let errors = found.par_iter().enumerate().map(|(i, found)| {
         let (m, x) = (sweep.material(i), sweep.arguments[i].as_dvec3());
@@ -206,17 +190,9 @@ fn directional_dipole_at_all_magnitudes() {
         let [ni, wi, no]: [DVec3; 3] = [d.normal0, d.normal1, d.normal2].map(|v| v.as_dvec3());
         let channel = |c: usize| {
             let profile = Directional::unpack(Matter::from(m), c);
-            let expected = profile.value(x, ni, wi, no, 0.0);
-            // Against the sum of the magnitudes of all that is added and subtracted.
-            let (s, z, h, r) = (profile.proposal.sigma_tr, profile.proposal.z_real, profile.height, x.length());
-            let magnitude = |d: f64, x: f64| {
-                let (sd, k) = (s * d, 1.0 + s * d);
-                let flux = z * k + (k + z * (3.0 * k + sd * sd) / (d * d) * x) * x;
-                (-sd).exp() / d.powi(3) * (profile.c_phi * (3.0 * d * d / z + 3.0 * k * x) + profile.c_e * flux)
-            };
-            let near = r.hypot(profile.nearest(x, ni, wi, no));
-            let scale = profile.beam * (magnitude(near, r) + magnitude(r.hypot(h), r + h));
-            error(found[c], expected, scale.max(expected), s * r.hypot(h))
+            let [expected, scale] = directional_scale(&profile, x, ni, wi, no);
+            let exponent = profile.proposal.sigma_tr * x.length().hypot(profile.height);
+            error(found[c], expected, scale, exponent)
         };
         (0..3).map(channel).fold(0.0, f64::max)
     });
@@ -250,7 +226,7 @@ fn golden_values_on_the_device() {
             material: i as u32,
         });
     }
-    for (found, (.., expected)) in sweep.evaluate(2, &sweep.arguments).iter().zip(&cases) {
+    for (found, (.., expected)) in sweep.evaluate(FUNCTION_DIRECTIONAL, &sweep.arguments).iter().zip(&cases) {
         assert!((f64::from(found.x) / expected - 1.0).abs() < 1e-5, "{found} for {expected}");
     }
 
@@ -264,7 +240,7 @@ fn golden_values_on_the_device() {
             vec![Shading::default(); radii.len()],
         );
         let profile = Profile::new(model, &matter);
-        for (r, found) in radii.iter().zip(sweep.evaluate(0, &sweep.arguments)) {
+        for (r, found) in radii.iter().zip(sweep.shapes()) {
             let expected = profile.shape(f64::from(*r));
             assert!((f64::from(found.x) / expected - 1.0).abs() < 1e-5, "model {model} r {r}: {found} for {expected}");
         }

@@ -1,7 +1,7 @@
 //! Probes with more hits than a list holds: which are kept, and what they weigh.
 
 use crate::{
-    Case, assert_close, bench, check,
+    assert_close, bench, case, check, run_case,
     scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec3};
@@ -9,6 +9,7 @@ use translucent::{
     Settings,
     reference::{self, Inputs, accumulate::accumulate, intersect, reproject::reproject},
     shared::{BATCHES, Hits, MAX_HITS, Probe, Slot, Step, Sums, Surface},
+    verify::Case,
 };
 
 const SHEETS: u32 = 20;
@@ -23,7 +24,7 @@ fn sheets() -> Case {
     let eye = Eye { eye: DVec3::new(0.0, 0.0, 5.0), at: DVec3::ZERO, lens: 0.1 };
     let light = (sun(), DVec3::new(0.5, 0.3, 4.0), DVec3::ZERO);
     let file = gltf(&[(mesh, 0)], &[matter([2.0, 3.0, 1.0], [0.2; 3], 1.3)], &[light], &eye);
-    Case::new(scene(&file), &Settings { resolution: Some((PIXELS, 1)), seed: 5, ..standard() })
+    case(scene(&file), &Settings { resolution: Some((PIXELS, 1)), seed: 5, ..standard() })
 }
 
 /// The uppermost sheet at a point of each pixel, and a probe that crosses all sheets there.
@@ -118,7 +119,8 @@ fn long_lists_weigh_what_the_twins_do() {
         let step = step(&inputs, sample_index);
         let list = |pixel: usize| reproject(&inputs, &step, pixel as u32, &surfaces[pixel], &probes[pixel]);
         let hits: Vec<Hits> = (0..PIXELS as usize).map(list).collect();
-        let out = case.run(
+        let out = run_case(
+            &case,
             "accumulate",
             &step,
             &[

@@ -2,7 +2,7 @@
 //! infinite, or negative light, and all but a few agree with the twins.
 
 use crate::{
-    Case, bench, check,
+    bench, case, check, run_case,
     scenes::{Eye, Mesh, gltf, matter, scene, standard, sun},
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -25,6 +25,7 @@ use translucent::{
     scene::{Environment, EnvironmentMap},
     settings::Model,
     shared::{BATCHES, Hits, MISS, Material, Pixel, Probe, Slot, Step, Sums, Surface},
+    verify::Case,
 };
 
 const WORLDS: u32 = 62;
@@ -122,7 +123,7 @@ fn world(seed: u32) -> Case {
     let built = [Model::Standard, Model::Better, Model::Burley, Model::Directional];
     let model = built[seed as usize % built.len()];
     let settings = Settings { resolution: Some((PIXELS / 8, 8)), projection, seed, ..standard() };
-    let mut case = Case::new(scene, &settings);
+    let mut case = case(scene, &settings);
     for (index, material) in case.prepared.materials.iter_mut().enumerate() {
         // An eighth in the opaque limit, as of tables.
         let lambert = index % 8 == 7;
@@ -213,7 +214,7 @@ fn a_million_sets_through_every_kernel() {
 
         let blank = vec![Surface { triangle: MISS, ..Surface::default() }; (PIXELS * BATCHES) as usize];
         let batch = (sample_index % BATCHES * PIXELS) as usize..((sample_index % BATCHES + 1) * PIXELS) as usize;
-        let out = case.run("primary", &step, &[(Slot::Surfaces, bytemuck::cast_slice(&blank))]);
+        let out = run_case(&case, "primary", &step, &[(Slot::Surfaces, bytemuck::cast_slice(&blank))]);
         let twins: Vec<_> = pixels.clone().map(|i| primary(&inputs, &step, i)).collect();
         for (gpu, twin) in out.get::<Surface>(Slot::Surfaces)[batch.clone()].iter().zip(&twins) {
             vectors_are_finite(&what, &[gpu.position, gpu.barycentric.extend(0.0)]);
@@ -225,7 +226,7 @@ fn a_million_sets_through_every_kernel() {
         g_buffers[batch.clone()].copy_from_slice(&surfaces);
         let g_buffers: (Slot, &[u8]) = (Slot::Surfaces, bytemuck::cast_slice(&g_buffers));
         let probes = vec![Probe::default(); PIXELS as usize];
-        let out = case.run("sample", &step, &[g_buffers, (Slot::Probes, bytemuck::cast_slice(&probes))]);
+        let out = run_case(&case, "sample", &step, &[g_buffers, (Slot::Probes, bytemuck::cast_slice(&probes))]);
         let probes: Vec<_> = pixels.clone().map(|i| sample(&inputs, &step, i, &surfaces[i as usize])).collect();
         for (gpu, twin) in out.get::<Probe>(Slot::Probes).iter().zip(&probes) {
             vectors_are_finite(&what, &[gpu.offset, gpu.direction, Vec3::new(gpu.t_min, gpu.t_max, gpu.radius)]);
@@ -239,7 +240,7 @@ fn a_million_sets_through_every_kernel() {
         let probe_buffer: (Slot, &[u8]) = (Slot::Probes, bytemuck::cast_slice(&probes));
         let lists = vec![Hits::default(); PIXELS as usize];
         let buffers = [g_buffers, probe_buffer, (Slot::HitLists, bytemuck::cast_slice(&lists))];
-        let out = case.run("reproject", &step, &buffers);
+        let out = run_case(&case, "reproject", &step, &buffers);
         let hits: Vec<_> = (pixels.clone())
             .map(|i| reproject(&inputs, &step, i, &surfaces[i as usize], &probes[i as usize]))
             .collect();
@@ -258,7 +259,7 @@ fn a_million_sets_through_every_kernel() {
             (Slot::RunningSums, bytemuck::cast_slice(&sums)),
             (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
         ];
-        let gpu = case.run("accumulate", &step, &buffers).get::<Sums>(Slot::RunningSums);
+        let gpu = run_case(&case, "accumulate", &step, &buffers).get::<Sums>(Slot::RunningSums);
         let twins: Vec<_> = (pixels.clone())
             .map(|i| {
                 let at = i as usize;
@@ -269,7 +270,7 @@ fn a_million_sets_through_every_kernel() {
             assert_eq!((gpu.invalid, twin.invalid), (0, false), "{what}, pixel {index}");
             lit.add(&what, gpu.subsurface, twin.radiance.as_vec3());
         }
-        let gpu = case.run("reflect", &step, &buffers).get::<Sums>(Slot::RunningSums);
+        let gpu = run_case(&case, "reflect", &step, &buffers).get::<Sums>(Slot::RunningSums);
         let twins: Vec<_> = pixels.map(|i| reflect(&inputs, &step, i, &surfaces[i as usize])).collect();
         for (index, (gpu, twin)) in gpu.iter().zip(&twins).enumerate() {
             assert_eq!((gpu.invalid, twin.invalid), (0, false), "{what}, pixel {index}");
@@ -299,7 +300,7 @@ fn a_million_sets_through_every_kernel() {
             (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
             (Slot::Pixels, bytemuck::cast_slice(&out)),
         ];
-        let gpu = case.run("resolve", &step, &buffers).get::<Pixel>(Slot::Pixels);
+        let gpu = run_case(&case, "resolve", &step, &buffers).get::<Pixel>(Slot::Pixels);
         for (i, gpu) in gpu.iter().enumerate() {
             let mine: Vec<Vec3> = (0..BATCHES as usize).map(|b| batch_sums[b * PIXELS as usize + i]).collect();
             let twin = resolve(&inputs.features, &step, &sums[i], &mine);

@@ -7,22 +7,6 @@ use translucent::{
     shared::*,
 };
 
-/// One invocation looks one texture up; `step_.ray_begin` is 1 for its alpha.
-const KERNEL: &str = r#"
-#version 460
-#include "shared.glsl"
-#include "math.glsl"
-#include "texture.glsl"
-BATCH_SUMS(read_write);
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= step_.pixel_count) return;
-    vec3 x = batch_sums[i];
-    vec4 v = texture_at(textures[uint(x.z)], x.xy);
-    batch_sums[i] = step_.ray_begin == 0u ? v.rgb : vec3(v.a);
-}
-"#;
-
 #[test]
 fn lookup_is_the_twins() {
     let number = |i: u32| f64::from(hash(i) >> 8) / f64::from(1 << 24);
@@ -56,7 +40,7 @@ fn lookup_is_the_twins() {
             Vec3::new(u(0), u(1), (i as usize % world.textures.len()) as f32)
         })
         .collect();
-    let found = [0, 1].map(|part| evaluate("texture", KERNEL, &world.inputs(), &[], part, &points));
+    let found = [FUNCTION_TEXTURE, FUNCTION_TEXTURE_ALPHA].map(|part| evaluate(part, &world.inputs(), &[], &points));
     let mut outside = 0;
     for (i, point) in points.iter().enumerate() {
         let texture = &world.textures[point.z as usize];

@@ -1,7 +1,7 @@
 //! Rays through the edges and vertices that triangles share meet exactly one of them, on the device and in its twin.
 
 use crate::{
-    Case, evaluate,
+    case, evaluate,
     scenes::{Eye, Mesh, gltf, matter, scene},
 };
 use glam::{DQuat, DVec3, EulerRot, Vec3};
@@ -12,29 +12,9 @@ use translucent::{
         Inputs, intersect,
         random::{hash, unit},
     },
-    shared::Shading,
+    shared::{FUNCTION_ALL, Shading},
+    verify::Case,
 };
-
-/// Each invocation counts the triangles of one set that a ray meets, whose base, offset and direction stand in the place
-/// of normals, and its set in that of a material; from the origin on, or along the whole line.
-const KERNEL: &str = r#"
-#version 460
-#include "shared.glsl"
-#include "math.glsl"
-#include "random.glsl"
-#include "texture.glsl"
-#include "intersect.glsl"
-SHADINGS(readonly);
-BATCH_SUMS(read_write);
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= step_.pixel_count) return;
-    Shading ray = shadings[i];
-    float t_min = step_.ray_begin == 0 ? 0.0 : -1e30;
-    traverse(Ray(ray.normal0, ray.normal1, ray.normal2, t_min, 1e30), ALL, ray.material, 0u);
-    batch_sums[i] = vec3(hit_count);
-}
-"#;
 
 const RAYS: u32 = 1 << 16;
 
@@ -47,7 +27,8 @@ fn vector(i: u32, k: u32) -> DVec3 {
     DVec3::new(component(0), component(1), component(2))
 }
 
-/// A ray from `base + offset` to `target`.
+/// A ray from `base + offset` to `target`; base, offset and direction stand in the place of normals, and its set in that of
+/// a material.
 fn ray(base: DVec3, offset: DVec3, target: DVec3, set: u32) -> Shading {
     let (base, offset) = (base.as_vec3(), offset.as_vec3());
     let direction = (target - base.as_dvec3() - offset.as_dvec3()).normalize().as_vec3();
@@ -57,9 +38,10 @@ fn ray(base: DVec3, offset: DVec3, target: DVec3, set: u32) -> Shading {
 /// Fails unless each ray meets one triangle of its set.
 fn assert_one_hit(what: &str, case: &Case, rays: &[Shading], whole_line: bool) {
     let inputs = case.inputs();
-    let counts = vec![Vec3::ZERO; rays.len()];
+    let t_min = if whole_line { -1e30 } else { 0.0 };
+    let ends = vec![Vec3::new(t_min, 1e30, 0.0); rays.len()];
     let given = Inputs { shadings: rays, ..inputs };
-    let found = evaluate("watertight", KERNEL, &given, &case.scene.nodes, u32::from(whole_line), &counts);
+    let found = evaluate(FUNCTION_ALL, &given, &case.scene.nodes, &ends);
     for (found, ray) in found.iter().zip(rays) {
         assert_eq!(found.x, 1.0, "{what}: {ray:?}");
     }
@@ -72,10 +54,10 @@ fn assert_one_hit(what: &str, case: &Case, rays: &[Shading], whole_line: bool) {
     }
 }
 
-fn case(meshes: &[(Mesh, usize)]) -> Case {
+fn of_meshes(meshes: &[(Mesh, usize)]) -> Case {
     let eye = Eye { eye: DVec3::Z * 20.0, at: DVec3::ZERO, lens: 0.5 };
     let materials = [matter([1.0; 3], [1.0; 3], 1.3), json!({})];
-    Case::new(scene(&gltf(meshes, &materials, &[], &eye)), &Settings::default())
+    case(scene(&gltf(meshes, &materials, &[], &eye)), &Settings::default())
 }
 
 #[test]
@@ -86,7 +68,7 @@ fn no_ray_passes_the_diagonal_of_a_quad() {
             quad.quad(DVec3::new(-half, -half, 0.0), DVec3::X * 2.0 * half, DVec3::Y * 2.0 * half);
             quad.positions.iter_mut().for_each(|p| *p = turn * *p + DVec3::new(0.1, -0.2, 0.3));
             // A ball of radius 1 in whose units the quad is huge or tiny.
-            let case = case(&[(Mesh::sphere(1.0, 4), 0), (quad, 1)]);
+            let case = of_meshes(&[(Mesh::sphere(1.0, 4), 0), (quad, 1)]);
             let inputs = case.inputs();
             let quad = inputs.triangles.iter().zip(inputs.shadings).filter(|(_, shading)| shading.material == 1);
             let quad: Vec<_> = quad.map(|(triangle, _)| *triangle).collect();
@@ -122,7 +104,7 @@ fn no_ray_leaves_a_closed_mesh() {
     {
         let mut ball = Mesh::sphere(1.0, 6);
         ball.positions.iter_mut().for_each(|p| *p *= stretch);
-        let case = case(&[(ball, 0)]);
+        let case = of_meshes(&[(ball, 0)]);
         let triangles = case.inputs().triangles;
         // In the units of kernels, from inside through a vertex, a point of an edge, or near one.
         let widest = stretch.max_element();

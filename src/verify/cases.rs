@@ -1,0 +1,178 @@
+//! Small scenes, made in the program, on which kernels are tested.
+
+use crate::{
+    error::Result,
+    measure::scenes::{Eye, Mesh, gltf, matter, sun},
+    prepare::{Prepared, prepare},
+    reference::Inputs,
+    scene::{Environment, EnvironmentMap, LoadOptions, Scene},
+    settings::{Directional, Model, Projection, Settings, SingleScattering},
+};
+use glam::{DVec3, Vec3};
+use serde_json::{Value, json};
+
+/// A scene with what kernels read of it.
+pub struct Case {
+    pub name: String,
+    pub scene: Scene,
+    pub prepared: Prepared,
+}
+
+impl Case {
+    /// # Errors
+    /// As [`prepare`].
+    pub fn new(name: impl Into<String>, scene: Scene, settings: &Settings) -> Result<Case> {
+        let prepared = prepare(&scene, settings)?;
+        Ok(Case { name: name.into(), scene, prepared })
+    }
+
+    pub fn inputs(&self) -> Inputs<'_> {
+        self.prepared.inputs(&self.scene)
+    }
+}
+
+/// Width and height of every case's image.
+pub const SIZE: u32 = 24;
+
+/// What is put on the table beside the ball.
+#[derive(Clone, Copy, PartialEq)]
+enum Light {
+    Delta,
+    Constant,
+    Image,
+    Emitters,
+}
+
+/// A ball of matter, faceted finely enough to have a smooth rim, over an opaque table.
+fn still_life(materials: &[Value], light: Light) -> Result<Scene> {
+    let eye = Eye { eye: DVec3::new(1.0, 2.0, 4.0), at: DVec3::new(0.0, -0.2, 0.0), lens: 0.6 };
+    let mut table = Mesh::default();
+    table.quad(DVec3::new(-2.0, -1.0, 2.0), DVec3::X * 4.0, DVec3::Z * -4.0);
+    let mut meshes = vec![(Mesh::sphere(1.0, 6), 0), (table, 1)];
+    if light == Light::Emitters {
+        let mut lamp = Mesh::default();
+        lamp.quad(DVec3::new(-1.0, 2.5, 1.0), DVec3::X, DVec3::Z);
+        lamp.quad(DVec3::new(1.5, 2.0, 1.0), DVec3::new(0.3, 0.4, 0.0), DVec3::Z);
+        meshes.push((lamp, 2));
+    }
+    let lights = match light {
+        Light::Delta => {
+            let spot = json!({"type": "spot", "intensity": 40.0, "range": 12.0, "color": [1.0, 0.7, 0.4],
+                "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.6}});
+            let point = json!({"type": "point", "intensity": 20.0});
+            let sun = (sun(), DVec3::new(3.0, 4.0, 2.0), DVec3::ZERO);
+            vec![sun, (spot, DVec3::new(-2.0, 3.0, 2.0), DVec3::ZERO), (point, DVec3::new(2.0, 2.0, 2.0), DVec3::ZERO)]
+        }
+        _ => vec![(sun(), DVec3::new(3.0, 4.0, 2.0), DVec3::ZERO)],
+    };
+    let file = gltf(&meshes, materials, &lights, &eye).to_string();
+    let mut scene = Scene::from_bytes("verify.gltf", file.as_bytes(), &LoadOptions::default())?;
+    match light {
+        Light::Constant => scene.set_environment(Environment::constant(DVec3::new(0.3, 0.5, 0.8))?)?,
+        Light::Image => {
+            let texel = |i: u32| Vec3::new(0.1 + (i % 7) as f32, 0.2 + (i % 5) as f32, 0.3 + (i % 11) as f32);
+            let map = EnvironmentMap::Image { width: 16, height: 8, radiance: (0..128).map(texel).collect() };
+            scene.set_environment(Environment { map, rotation: 40.0, scale: 0.3 })?;
+        }
+        Light::Delta | Light::Emitters => {}
+    }
+    Ok(scene)
+}
+
+fn materials() -> Vec<Value> {
+    let table = json!({"name": "table", "pbrMetallicRoughness": {
+        "baseColorFactor": [0.6, 0.4, 0.3, 1.0], "metallicFactor": 0.2, "roughnessFactor": 0.6}});
+    let lamp = json!({"name": "lamp", "emissiveFactor": [1.0, 0.8, 0.6], "doubleSided": true,
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 5.0}}});
+    vec![matter([4.0, 2.0, 1.0], [0.3, 0.2, 0.1], 1.4), table, lamp]
+}
+
+/// What all cases have in common.
+fn settings(seed: u32) -> Settings {
+    Settings {
+        resolution: Some((SIZE, SIZE)),
+        directions: 2,
+        seed,
+        show_environment: true,
+        single_scattering: SingleScattering::Off,
+        ..Settings::default()
+    }
+}
+
+/// Every model, projection and kind of light, once or more.
+///
+/// # Errors
+/// None on sound builds: the scenes are valid.
+pub fn cases() -> Result<Vec<Case>> {
+    use Projection::{Camera, Mis, Normal};
+    let list = [
+        ("standard, mis, delta lights", Model::Standard, Mis, Light::Delta),
+        ("standard, camera, uniform light", Model::Standard, Camera, Light::Constant),
+        ("better, normal, image", Model::Better, Normal, Light::Image),
+        ("burley, mis, emitters", Model::Burley, Mis, Light::Emitters),
+        ("directional, mis, delta lights", Model::Directional, Mis, Light::Delta),
+        ("directional, camera, image", Model::Directional, Camera, Light::Image),
+        ("table, mis, uniform light", Model::Table, Mis, Light::Constant),
+        ("lambert, mis, emitters", Model::Lambert, Mis, Light::Emitters),
+    ];
+    let mut cases = vec![];
+    for (seed, (name, model, projection, light)) in (3..).zip(list) {
+        let mut materials = materials();
+        // Tables of this matter come with the crate.
+        materials[0]["extras"]["bssrdf"]["ior"] = json!(if model == Model::Table { 1.3 } else { 1.4 });
+        if matches!(model, Model::Standard | Model::Better) {
+            materials[0]["extras"]["bssrdf"]["g"] = json!(if projection == Normal { -0.6 } else { 0.7 });
+        }
+        if model == Model::Burley {
+            // No longer smooth.
+            if let Some(bssrdf) = materials[0]["extras"]["bssrdf"].as_object_mut() {
+                bssrdf.remove("surface");
+            }
+            materials[0]["pbrMetallicRoughness"] = json!({"roughnessFactor": 0.6});
+        }
+        let scene = still_life(&materials, light)?;
+        let single_scattering = match model {
+            Model::Standard | Model::Better => SingleScattering::On,
+            _ => SingleScattering::Off,
+        };
+        let directional = Some(Directional { reciprocal: projection == Mis, ..Directional::default() });
+        let settings = Settings { model, projection, directional, single_scattering, ..settings(seed) };
+        cases.push(Case::new(name, scene, &settings)?);
+    }
+    cases.push(mixed()?);
+    Ok(cases)
+}
+
+/// What whole images are made of: the standard dipole under the sun and a uniform sky.
+///
+/// # Errors
+/// As [`cases`].
+pub fn portrait(projection: Projection) -> Result<(Scene, Settings)> {
+    let scene = still_life(&materials(), Light::Constant)?;
+    Ok((scene, Settings { resolution: Some((16, 16)), model: Model::Standard, projection, ..settings(4) }))
+}
+
+/// A ball of three media in one set.
+fn mixed() -> Result<Case> {
+    let mut scene = still_life(&materials(), Light::Delta)?;
+    let mut members = vec![0];
+    for (model, factor, roughness) in [(Model::Burley, 4.0, 0.0), (Model::Directional, 0.5, 0.7)] {
+        let mut material = scene.materials[0].clone();
+        material.roughness = roughness;
+        if let Some(medium) = &mut material.medium {
+            medium.model = Some(model);
+            medium.sigma_s_prime *= factor;
+            medium.sigma_a /= factor;
+        }
+        members.push(scene.materials.len());
+        scene.materials.push(material);
+    }
+    let of_ball = scene.shadings.iter_mut().filter(|shading| shading.material == 0);
+    for (index, shading) in of_ball.enumerate() {
+        shading.material = members[index % 3] as u32;
+    }
+    if let Some(set) = scene.sets.iter_mut().find(|set| set.materials == [0]) {
+        set.materials = members;
+    }
+    Case::new("three media, mis, delta lights", scene, &settings(12))
+}

@@ -1,0 +1,21 @@
+//! The tests of `verify` on this device, all of which must pass.
+
+use crate::{bench, check};
+use translucent::verify::{Context, TESTS};
+
+#[test]
+fn every_test_passes() {
+    let mut bench = bench();
+    let mut failed = vec![];
+    let only = std::env::var("ONLY").unwrap_or_default();
+    for test in TESTS.iter().filter(|test| test.name.contains(&only)) {
+        let start = std::time::Instant::now();
+        let verdict = test.run(&mut Context::new(&mut bench)).expect("the device runs it");
+        println!("{} {:.2} s: {verdict}", test.name, start.elapsed().as_secs_f64());
+        if !verdict.passed() {
+            failed.push(test.name);
+        }
+    }
+    check(&bench);
+    assert!(failed.is_empty(), "{failed:?}");
+}
