@@ -140,6 +140,92 @@ const uint DIM_SINGLE = 16u;
 const uint DIM_SINGLE_LIGHT = 18u;
 // Dimensions 20 and 21: point of an emitter for that point (a point per direction).
 const uint DIM_SINGLE_EMITTER = 20u;
+// Of `functions`: x y + z, x / y and sqrt |x|, for what the device's arithmetic is.
+const uint FUNCTION_ARITHMETIC = 0u;
+// Of `functions`: dot, length and cross product.
+const uint FUNCTION_DOT = 1u;
+// Of `functions`: `hash`.
+const uint FUNCTION_HASH = 2u;
+// Of `functions`: `scramble`.
+const uint FUNCTION_SCRAMBLE = 3u;
+// Of `functions`: `sobol1`.
+const uint FUNCTION_SOBOL = 4u;
+// Of `functions`: `dimension_key` of `pixel_key`.
+const uint FUNCTION_KEY = 5u;
+// Of `functions`: `random_point`.
+const uint FUNCTION_POINT = 6u;
+// Of `functions`: `exp_`.
+const uint FUNCTION_EXP = 7u;
+// Of `functions`: `log_`.
+const uint FUNCTION_LOG = 8u;
+// Of `functions`: `log1p_`.
+const uint FUNCTION_LOG1P = 9u;
+// Of `functions`: `one_minus_exp_over`.
+const uint FUNCTION_ONE_MINUS_EXP_OVER = 10u;
+// Of `functions`: `cos_sin_2pi`.
+const uint FUNCTION_COS_SIN = 11u;
+// Of `functions`: `atan2_`.
+const uint FUNCTION_ATAN2 = 12u;
+// Of `functions`: `orthonormal_basis`.
+const uint FUNCTION_BASIS = 13u;
+// Of `functions`: `fresnel`.
+const uint FUNCTION_FRESNEL = 14u;
+// Of `functions`: `crossing`.
+const uint FUNCTION_CROSSING = 15u;
+// Of `functions`: `ggx_distribution` and `ggx_lambda`.
+const uint FUNCTION_GGX = 16u;
+// Of `functions`: `draw_half_vector`.
+const uint FUNCTION_HALF_VECTOR = 17u;
+// Of `functions`: `refracted`.
+const uint FUNCTION_REFRACTED = 18u;
+// Of `functions`: `phase`.
+const uint FUNCTION_PHASE = 19u;
+// Of `functions`: `draw_phase`.
+const uint FUNCTION_DRAW_PHASE = 20u;
+// Of `functions`: `texture_at`, colour.
+const uint FUNCTION_TEXTURE = 21u;
+// Of `functions`: `texture_at`, alpha.
+const uint FUNCTION_TEXTURE_ALPHA = 22u;
+// Of `functions`: `delta_light`, irradiance.
+const uint FUNCTION_DELTA_LIGHT = 23u;
+// Of `functions`: `delta_light`, direction.
+const uint FUNCTION_LIGHT_DIRECTION = 24u;
+// Of `functions`: `environment_radiance`.
+const uint FUNCTION_ENVIRONMENT = 25u;
+// Of `functions`: `environment_density`.
+const uint FUNCTION_ENVIRONMENT_DENSITY = 26u;
+// Of `functions`: `draw_environment`.
+const uint FUNCTION_DRAW_ENVIRONMENT = 27u;
+// Of `functions`: `draw_cosine`.
+const uint FUNCTION_DRAW_COSINE = 28u;
+// Of `functions`: `draw_emitter`.
+const uint FUNCTION_DRAW_EMITTER = 29u;
+// Of `functions`: `emitter_density` in `combined`.
+const uint FUNCTION_EMITTER_DENSITY = 30u;
+// Of `functions`: `shape_shifted`.
+const uint FUNCTION_SHAPE = 31u;
+// Of `functions`: `draw_radius` and `radial_density`.
+const uint FUNCTION_RADIUS = 32u;
+// Of `functions`: `directional_value`.
+const uint FUNCTION_DIRECTIONAL = 33u;
+// Of `functions`: `obliqueness`.
+const uint FUNCTION_OBLIQUENESS = 34u;
+// Of `functions`: `pick_member`.
+const uint FUNCTION_PICK = 35u;
+// Of `functions`: `technique_fractions`.
+const uint FUNCTION_FRACTIONS = 36u;
+// Of `functions`: `seen`.
+const uint FUNCTION_SEEN = 37u;
+// Of `functions`: `mixture_density` and `camera_ratio`.
+const uint FUNCTION_DENSITY = 38u;
+// Of `functions`: `traverse` for the nearest hit.
+const uint FUNCTION_CLOSEST = 39u;
+// Of `functions`: `traverse` for any hit.
+const uint FUNCTION_ANY = 40u;
+// Of `functions`: `traverse` for all hits.
+const uint FUNCTION_ALL = 41u;
+// Of `functions`: `compensated_add`.
+const uint FUNCTION_ADD = 42u;
 
 // One of PROJECTION_*.
 layout(constant_id = 1) const uint PROJECTION = 0;
