@@ -29,8 +29,8 @@ pub enum Error {
     #[error("Vulkan: {step}: {result}")]
     Vulkan { step: String, result: ash::vk::Result },
 
-    /// Device memory could not be had.
-    #[error("device memory: {step}: {problem}")]
+    /// Memory could not be had, or is known beforehand not to suffice: the device's, or the host's.
+    #[error("memory: {step}: {problem}")]
     Memory { step: String, problem: String },
 }
 
@@ -45,6 +45,12 @@ impl Error {
 
     pub(crate) fn setting(setting: impl Into<String>, problem: impl Into<String>) -> Error {
         Error::Setting { setting: setting.into(), problem: problem.into() }
+    }
+
+    /// Whether the device was lost: nothing can be done with it any more, but perhaps with a new one
+    /// ([`Renderer::resume`](crate::Renderer::resume)).
+    pub fn is_device_lost(&self) -> bool {
+        matches!(self, Error::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. })
     }
 
     /// Whether the input or the settings are at fault, not the machine: the program exits with 2.

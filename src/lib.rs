@@ -54,6 +54,11 @@
 //! ([`Device::from_raw`]). There `begin` numbers the samples and `clear` forgets the sums if they do not go on, so what
 //! the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
 //!
+//! *Failures.* Every Vulkan call that fails is an error that names the step ([`Error::Vulkan`]); nothing is leaked, and
+//! the renderer keeps the samples whose sums are known. When the device is lost, [`Renderer::with_recovery`] goes on with
+//! another from the sums on the host; the image is the same, bit for bit. Drivers and operating systems give out more
+//! memory than they have, so a render is refused beforehand if it needs more than is left ([`Error::Memory`]).
+//!
 //! # What may use what
 //!
 //! | module | may use | holds |

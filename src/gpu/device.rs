@@ -140,12 +140,20 @@ pub(super) struct Handles {
     pub profiling: Profiling,
     pub force_staging: bool,
     max_buffer_bytes: u64,
-    heap_bytes: u64,
+    heap: Heap,
     // None only while opening and dropping.
     allocator: Option<Arc<dyn Allocator>>,
     // The instance if it and the device are ours to destroy; none for a caller's device.
     owned: Option<Instance>,
     log: ValidationLog,
+}
+
+/// The memory heap that device buffers come from.
+struct Heap {
+    index: usize,
+    bytes: u64,
+    /// To be asked how much of it is left; none without VK_EXT_memory_budget.
+    budget: Option<(ash::Instance, vk::PhysicalDevice)>,
 }
 
 /// VK_EXT_external_memory_host.
@@ -166,6 +174,7 @@ struct Parts<'a> {
     info: DeviceInfo,
     debug_utils: bool,
     host_import: bool,
+    memory_budget: bool,
     pipeline_cache: vk::PipelineCache,
     log: ValidationLog,
 }
@@ -197,7 +206,7 @@ impl Device {
     /// nobody else uses the queue.
     pub unsafe fn from_raw(raw: RawDevice) -> Result<Device> {
         requirements::check_version(&raw.instance, &raw.device, raw.physical)?;
-        let info = describe(&raw.instance, 0, raw.physical).info;
+        let Candidate { info, memory_budget, .. } = describe(&raw.instance, 0, raw.physical);
         if !info.lacks.is_empty() {
             return Err(Error::Device(info.to_string()));
         }
@@ -221,6 +230,7 @@ impl Device {
             info,
             debug_utils: raw.debug_utils,
             host_import,
+            memory_budget,
             pipeline_cache: raw.pipeline_cache,
             log: ValidationLog::default(),
         });
@@ -262,7 +272,18 @@ impl Device {
     /// Bytes of the largest memory heap that device buffers can use. Drivers may hand out more than there is, so
     /// keep well below it.
     pub fn heap_size(&self) -> u64 {
-        self.handles.heap_bytes
+        self.handles.heap.bytes
+    }
+
+    /// Bytes of that heap that this process may still take: what VK_EXT_memory_budget says, else the whole heap.
+    pub fn heap_left(&self) -> u64 {
+        let Heap { index, bytes, budget } = &self.handles.heap;
+        let Some((instance, physical)) = budget else { return *bytes };
+        let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+        let mut properties = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
+        // SAFETY: the physical device is of this instance and has the extension; the structures outlive the call.
+        unsafe { instance.get_physical_device_memory_properties2(*physical, &mut properties) };
+        budget.heap_budget[*index].saturating_sub(budget.heap_usage[*index]).min(*bytes)
     }
 
     /// Of which number (bytes) address and size of memory for [`Buffer::import_host`](super::Buffer::import_host) must
@@ -311,6 +332,7 @@ impl Handles {
             info: chosen.info.clone(),
             debug_utils: instance.debug_utils,
             host_import: chosen.host_import,
+            memory_budget: chosen.memory_budget,
             pipeline_cache: vk::PipelineCache::null(),
             log: instance.log.clone(),
         });
@@ -361,7 +383,10 @@ impl Handles {
             max_buffer_bytes: u64::from(limits.max_storage_buffer_range)
                 .min(maintenance3.max_memory_allocation_size)
                 .min(maintenance4.max_buffer_size),
-            heap_bytes: buffer_heap(&device, &heaps),
+            heap: {
+                let (index, bytes) = buffer_heap(&device, &heaps);
+                Heap { index, bytes, budget: parts.memory_budget.then(|| (instance.clone(), physical)) }
+            },
             allocator: None,
             log: parts.log,
             owned: None,
@@ -463,8 +488,8 @@ fn is_named(info: &DeviceInfo, wanted: &str) -> bool {
     !wanted.is_empty() && (info.name.to_lowercase().contains(&wanted) || hex(&info.uuid) == hex(&wanted))
 }
 
-/// Size of the largest heap from which a buffer like ours can come, device-local if there is one.
-fn buffer_heap(device: &ash::Device, heaps: &vk::PhysicalDeviceMemoryProperties) -> u64 {
+/// Index and size of the largest heap from which a buffer like ours can come, device-local if there is one.
+fn buffer_heap(device: &ash::Device, heaps: &vk::PhysicalDeviceMemoryProperties) -> (usize, u64) {
     let create = super::buffer::create_info(Slot::ALL.len() as u64);
     let query = vk::DeviceBufferMemoryRequirements::default().create_info(&create);
     let mut needs = vk::MemoryRequirements2::default();
@@ -475,8 +500,9 @@ fn buffer_heap(device: &ash::Device, heaps: &vk::PhysicalDeviceMemoryProperties)
         .filter(|(i, _)| needs.memory_requirements.memory_type_bits & (1 << i) != 0)
         .map(|(_, kind)| {
             let local = kind.property_flags.contains(vk::MemoryPropertyFlags::DEVICE_LOCAL);
-            (local, heaps.memory_heaps[kind.heap_index as usize].size)
+            let index = kind.heap_index as usize;
+            (local, heaps.memory_heaps[index].size, index)
         })
         .max()
-        .map_or(0, |(_, size)| size)
+        .map_or((0, 0), |(_, size, index)| (index, size))
 }

@@ -6,7 +6,7 @@ use crate::{
     shared::{Slot, Step},
 };
 use ash::{
-    ext::{debug_utils, external_memory_host},
+    ext::{debug_utils, external_memory_host, memory_budget},
     vk,
 };
 use std::{
@@ -93,6 +93,8 @@ pub(super) struct Candidate {
     pub family: u32,
     /// It has VK_EXT_external_memory_host.
     pub host_import: bool,
+    /// It has VK_EXT_memory_budget, which only queries need and nobody has to enable.
+    pub memory_budget: bool,
     pub info: DeviceInfo,
 }
 
@@ -252,7 +254,13 @@ pub(super) fn describe(instance: &ash::Instance, index: usize, physical: vk::Phy
         api_version: version_text(version),
         lacks,
     };
-    Candidate { physical, family: family.unwrap_or(0) as u32, host_import: named(external_memory_host::NAME), info }
+    Candidate {
+        physical,
+        family: family.unwrap_or(0) as u32,
+        host_import: named(external_memory_host::NAME),
+        memory_budget: named(memory_budget::NAME),
+        info,
+    }
 }
 
 impl Drop for Instance {

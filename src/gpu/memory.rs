@@ -65,7 +65,12 @@ unsafe impl Allocator for Mutex<memory::Allocator> {
             linear: true,
             allocation_scheme: memory::AllocationScheme::GpuAllocatorManaged,
         };
-        let given = lock(self).allocate(&description).map_err(|error: AllocationError| error.to_string())?;
+        let given = lock(self).allocate(&description).map_err(|error| match error {
+            AllocationError::OutOfMemory => {
+                format!("no device memory is left for {} bytes", request.requirements.size)
+            }
+            other => other.to_string(),
+        })?;
         Ok(Allocation {
             // SAFETY: it is bound to one buffer and not freed or mapped by hand.
             memory: unsafe { given.memory() },

@@ -25,8 +25,6 @@ pub struct Recorder {
     // What the recording uses, until the next begins.
     held: Vec<Arc<dyn Any + Send + Sync>>,
     recording: bool,
-    // Submitted, and the wait failed.
-    pending: bool,
 }
 
 struct Profile {
@@ -86,7 +84,6 @@ impl Recorder {
             profile: None,
             held: Vec::new(),
             recording: false,
-            pending: false,
         };
         let device = &handles.device;
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(handles.family);
@@ -111,7 +108,6 @@ impl Recorder {
     /// # Errors
     /// [`crate::Error::Vulkan`].
     pub fn begin(&mut self) -> Result<()> {
-        self.wait_if_pending();
         self.held.clear();
         self.recording = false;
         let device = &self.commands.handles.device;
@@ -198,10 +194,13 @@ impl Recorder {
             device.end_command_buffer(self.commands.raw).during("end the recording")?;
             device.reset_fences(&[self.fence]).during("reset the fence")?;
             device.queue_submit2(*handles.queue()?, &submit, self.fence).during("submit the recording")?;
-            self.pending = true;
-            device.wait_for_fences(&[self.fence], true, u64::MAX).during("wait for the recording")?;
+            let waited = device.wait_for_fences(&[self.fence], true, u64::MAX).during("wait for the recording");
+            if waited.is_err() {
+                // What it uses may be dropped from here on. Of a lost device nothing runs any more.
+                let _ = device.queue_wait_idle(*handles.queue()?);
+            }
+            waited?;
         }
-        self.pending = false;
         self.profile.as_mut().map_or(Ok(()), |profile| profile.read(handles, submitted))
     }
 
@@ -225,23 +224,12 @@ impl Recorder {
             self.held.push(object.clone());
         }
     }
-
-    fn wait_if_pending(&mut self) {
-        if self.pending {
-            if let Ok(queue) = self.commands.handles.queue() {
-                // SAFETY: the device is alive and its queue locked. If it is lost, nothing runs any more.
-                let _ = unsafe { self.commands.handles.device.queue_wait_idle(*queue) };
-            }
-            self.pending = false;
-        }
-    }
 }
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        self.wait_if_pending();
         let device = &self.commands.handles.device;
-        // SAFETY: nothing of it runs any more; null handles are ignored.
+        // SAFETY: nothing of it runs any more: every submission was waited for. Null handles are ignored.
         unsafe {
             for pool in self.profile.iter().flat_map(|profile| &profile.pools) {
                 device.destroy_query_pool(*pool, None);

@@ -13,10 +13,10 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::Instant,
+    time::{Duration, Instant},
 };
 use translucent::{
-    Device, DeviceOptions, Image, Renderer, Settings,
+    Device, DeviceOptions, Error, Image, Renderer, Settings,
     image::{Attribute, check_writable},
     profile::{Timeline, begin},
     shared::BATCHES,
@@ -24,6 +24,9 @@ use translucent::{
 
 /// The layers that `--aov` knows; R, G, B and A are always there.
 const LAYERS: [&str; 8] = ["subsurface", "reflection", "variance", "N", "P", "Z", "samples", "material"];
+
+/// Between copies of the sums from the device: what a lost device costs at most.
+const KEEP_EVERY: Duration = Duration::from_secs(30);
 
 #[derive(clap::Args)]
 pub struct Render {
@@ -81,21 +84,27 @@ impl Render {
         drop(opening);
         let settings = Settings { timeline: timeline.clone(), ..self.settings() };
         let mut renderer = Renderer::new(&device, &scene, &settings)?;
+        renderer.keep_every(KEEP_EVERY);
         renderer.prepared().warnings().for_each(|warning| self.warn(&warning));
 
         let bar = self.bar();
         let start = Instant::now();
-        let finished = renderer.render_range(self.samples.clone(), &mut |progress| {
-            if bar.length() != Some(progress.total) {
-                bar.set_length(progress.total);
-            }
-            bar.set_position(progress.done);
-            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let reopen = |why: &Error| {
+            bar.suspend(|| self.warn(&format!("{why}; going on with a new device")));
+            Device::open(&options)
+        };
+        let (_, (finished, seconds, samples, mut image)) = renderer.with_recovery(&scene, reopen, |renderer| {
+            let finished = renderer.render_rest(self.samples.clone(), &mut |progress| {
+                if bar.length() != Some(progress.total) {
+                    bar.set_length(progress.total);
+                }
+                bar.set_position(progress.done);
+                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })?;
+            bar.finish_and_clear();
+            let (seconds, samples) = (start.elapsed().as_secs_f64(), renderer.samples().len());
+            Ok((finished, seconds, samples, renderer.take_image()?))
         })?;
-        bar.finish_and_clear();
-        let seconds = start.elapsed().as_secs_f64();
-        let samples = renderer.samples().len();
-        let mut image = renderer.finish()?;
         self.keep_asked(&mut image);
         if let Some(Attribute::Integer(invalid @ 1..)) = image.attributes.get("translucent.invalidSamples") {
             self.warn(&format!("samples left out because they were not finite or negative: {invalid}"));

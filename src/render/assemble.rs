@@ -1,7 +1,7 @@
 //! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it. Every value is
 //! finite: what exceeds f32 is its largest number.
 
-use super::{Film, Renderer, own, spirv_hash};
+use super::{Renderer, own, spirv_hash};
 use crate::{
     error::Result,
     gpu::{Buffer, download_to},
@@ -10,7 +10,7 @@ use crate::{
     shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
 };
 use glam::{DVec3, Vec3};
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 /// What becomes of the sums when an image is made of them.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -67,8 +67,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         }
         if sums == Sums::Freed {
             renderer.resident = None;
-            renderer.bands[band].film = Film::Empty;
-            renderer.bands[band].sums = Default::default();
+            renderer.bands[band].free(range.start);
         }
     }
     Ok(Image {
@@ -77,7 +76,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         origin: (view.crop_x, rows.start),
         full: (view.width, view.height),
         channels: channels.list,
-        attributes: attributes(renderer, invalid, has_variance),
+        attributes: attributes(renderer, range, invalid, has_variance),
     })
 }
 
@@ -135,6 +134,40 @@ fn centre(renderer: &Renderer, geometry: &Geometry, surface: &Surface) -> Centre
     }
 }
 
+const NAMES: [&str; 19] = [
+    "R",
+    "G",
+    "B",
+    "A",
+    "subsurface.R",
+    "subsurface.G",
+    "subsurface.B",
+    "reflection.R",
+    "reflection.G",
+    "reflection.B",
+    "N.X",
+    "N.Y",
+    "N.Z",
+    "P.X",
+    "P.Y",
+    "P.Z",
+    "Z",
+    "samples.Y",
+    "material.Y",
+];
+
+const VARIANCE: [&str; 3] = ["variance.R", "variance.G", "variance.B"];
+
+/// Names of the channels in the order in which they are filled.
+fn names(has_variance: bool) -> impl Iterator<Item = &'static str> {
+    NAMES.into_iter().chain(VARIANCE.into_iter().filter(move |_| has_variance))
+}
+
+/// Bytes of the image for each pixel.
+pub fn bytes_per_pixel(has_variance: bool) -> u64 {
+    (names(has_variance).count() * size_of::<f32>()) as u64
+}
+
 /// The channels in the order in which they are filled.
 struct Channels {
     list: Vec<Channel>,
@@ -143,14 +176,8 @@ struct Channels {
 
 impl Channels {
     fn new(count: usize, has_variance: bool) -> Channels {
-        let mut names = vec!["R", "G", "B", "A"];
-        names.extend(["subsurface.R", "subsurface.G", "subsurface.B", "reflection.R", "reflection.G", "reflection.B"]);
-        names.extend(["N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "Z", "samples.Y", "material.Y"]);
-        if has_variance {
-            names.extend(["variance.R", "variance.G", "variance.B"]);
-        }
-        let channel = |name: &&str| Channel { name: name.to_string(), data: Vec::with_capacity(count) };
-        Channels { list: names.iter().map(channel).collect(), has_variance }
+        let channel = |name: &'static str| Channel { name: name.into(), data: Vec::with_capacity(count) };
+        Channels { list: names(has_variance).map(channel).collect(), has_variance }
     }
 
     fn push(&mut self, pixel: &Pixel, centre: &Centre) {
@@ -195,8 +222,7 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
     })
 }
 
-fn attributes(renderer: &Renderer, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
-    let range = renderer.samples();
+fn attributes(renderer: &Renderer, range: Range<u32>, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
     let settings = &renderer.settings;
     let info = renderer.device.info();
     let mut attributes: Vec<(&str, Attribute)> = vec![

@@ -19,9 +19,28 @@ pub struct Band {
     /// End of the samples in its sums.
     pub end: u32,
     pub film: Film,
-    /// RunningSums and BatchSums as bytes, if they are on the host. Allocated once: bands that take turns would leave
-    /// the allocator holes that it does not give back.
+    /// RunningSums and BatchSums as bytes, as they last were on the host. Allocated once: bands that take turns would
+    /// leave the allocator holes that it does not give back.
     pub sums: [Vec<u8>; 2],
+    /// End of the samples in `sums`; none before they were on the host.
+    pub kept: Option<u32>,
+}
+
+impl Band {
+    /// Goes back to what the host has, where the device's sums cannot be had or trusted; without any, to `begin`.
+    pub fn roll_back(&mut self, begin: u32) {
+        (self.film, self.end) = match self.kept {
+            Some(end) => (Film::OnHost, end),
+            None => (Film::Empty, begin),
+        };
+    }
+
+    /// Gives the memory of the sums back.
+    pub fn free(&mut self, begin: u32) {
+        self.sums = Default::default();
+        self.kept = None;
+        self.roll_back(begin);
+    }
 }
 
 /// Where a band's sums are.
@@ -59,10 +78,13 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let slots = slots(prepared);
     let widest = slots.iter().map(|slot| bytes_per_pixel(*slot)).max().unwrap_or(1);
     let whole: u64 = slots.iter().map(|slot| bytes_per_pixel(*slot)).sum();
-    // Half of the heap is left to the scene and to others.
-    let limit = (limits.buffer_bytes / widest).min(limits.heap_bytes / 2 / whole);
-    let wanted = if settings.recording { u32::MAX } else { settings.band_pixels.unwrap_or(BAND_PIXELS).max(1) };
+    let limit = limits.buffer_bytes / widest;
     let width = prepared.view.crop_width;
+    // Half of the memory is left to the scene and to others. Whether it suffices at all is asked later.
+    let wanted = match settings.recording {
+        true => u64::MAX,
+        false => u64::from(settings.band_pixels.unwrap_or(BAND_PIXELS)).min(limits.heap_bytes / 2 / whole),
+    };
     if u64::from(width) > limit {
         return Err(Error::Memory {
             step: "cut the image into bands".into(),
@@ -70,7 +92,7 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
         });
     }
     let rows = prepared.rows.end - prepared.rows.start;
-    let most = (u64::from(wanted).min(limit) / u64::from(width)).clamp(1, u64::from(rows)) as u32;
+    let most = (wanted.min(limit) / u64::from(width)).clamp(1, u64::from(rows)) as u32;
     let count = rows.div_ceil(most);
     if settings.recording && count > 1 {
         let problem =
@@ -82,7 +104,8 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
             let edge = |band: u32| (u64::from(rows) * u64::from(band) / u64::from(count)) as u32;
             let (first, end) = (edge(band), edge(band + 1));
             let pixels = (end - first) * width;
-            Band { first_row: prepared.rows.start + first, pixels, end: 0, film: Film::Empty, sums: Default::default() }
+            let first_row = prepared.rows.start + first;
+            Band { first_row, pixels, end: 0, film: Film::Empty, sums: Default::default(), kept: None }
         })
         .collect())
 }

@@ -2,8 +2,11 @@
 
 mod assemble;
 mod bands;
+mod budget;
+mod host;
 mod plan;
 mod record;
+mod sums;
 mod timing;
 mod update;
 
@@ -12,7 +15,7 @@ pub use record::Output;
 
 use crate::{
     error::{Error, Result},
-    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, download_to, upload},
+    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
     image::Image,
     prepare::{Prepared, prepare},
     profile::{self, Work},
@@ -21,17 +24,17 @@ use crate::{
     settings::Settings,
     shared::{BATCHES, MAX_RAYS, MAX_SINGLE, NO_SAMPLES, Progress as Count, STRATUM, Slot, Step},
 };
-use bands::{Band, Film};
-use std::ops::{ControlFlow, Range};
+use bands::Band;
+use std::{
+    ops::{ControlFlow, Range},
+    time::{Duration, Instant},
+};
 
 /// Samples between two visits of a band when an image has several: each batch passes through one stratum.
 const PASS: u32 = BATCHES * STRATUM;
 
 /// Pixel samples of one submission: about a second of software Vulkan, milliseconds of a GPU.
 const SUBMISSION: u64 = 1 << 20;
-
-/// What a band takes along when it leaves the device.
-const SUMS: [Slot; 2] = [Slot::RunningSums, Slot::BatchSums];
 
 /// What the host writes between recordings.
 const WRITTEN: [Slot; 4] = [Slot::Views, Slot::Lights, Slot::Materials, Slot::Progresses];
@@ -102,6 +105,11 @@ pub struct Renderer {
     begin: Option<u32>,
     /// Samples were submitted before, so the driver has compiled what it puts off until then.
     warm: bool,
+    /// How often the sums of the band on the device are copied to the host, and when they last were.
+    keep_every: Option<Duration>,
+    kept_at: Instant,
+    /// Where sums are copied to before they take the place of older ones.
+    spare: [Vec<u8>; 2],
 }
 
 impl Renderer {
@@ -138,7 +146,7 @@ impl Renderer {
         scene: &Scene,
         settings: &Settings,
         change: impl FnOnce(&mut Prepared),
-        mut given: Vec<(Slot, Buffer)>,
+        given: Vec<(Slot, Buffer)>,
     ) -> Result<Renderer> {
         if !(1..=128).contains(&settings.workgroup) {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
@@ -147,6 +155,20 @@ impl Renderer {
         let mut prepared = prepare(scene, settings)?;
         change(&mut prepared);
         drop(span);
+        let limits = Limits::of(device);
+        let bands = bands::split(limits, &prepared, settings)?;
+        budget::check(limits, scene, &prepared, &bands)?;
+        Renderer::with_bands(device, scene, settings, prepared, given, bands)
+    }
+
+    fn with_bands(
+        device: &Device,
+        scene: &Scene,
+        settings: &Settings,
+        prepared: Prepared,
+        mut given: Vec<(Slot, Buffer)>,
+        bands: Vec<Band>,
+    ) -> Result<Renderer> {
         let span = profile::begin(&settings.timeline, "pipelines");
         let kernels = Kernels::new(device, &prepared, settings.workgroup)?;
         drop(span);
@@ -180,7 +202,6 @@ impl Renderer {
             upload(device, &buffer, data)?;
             buffers.push((slot, buffer));
         }
-        let bands = bands::split(Limits::of(device), &prepared, settings)?;
         let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
         for (slot, bytes) in plan::sizes(scene, &prepared, pixels) {
             if buffers.iter().all(|(made, _)| *made != slot) {
@@ -220,6 +241,9 @@ impl Renderer {
             strata: [None; BATCHES as usize],
             begin: None,
             warm: false,
+            keep_every: None,
+            kept_at: Instant::now(),
+            spare: Default::default(),
         })
     }
 
@@ -261,8 +285,8 @@ impl Renderer {
         self.resident = self.settings.recording.then_some(0);
         self.set_count(Count { end: NO_SAMPLES, ..self.count().unwrap_or_default() });
         for band in &mut self.bands {
-            band.film = Film::Empty;
-            band.end = 0;
+            band.kept = None;
+            band.roll_back(0);
         }
     }
 
@@ -277,6 +301,9 @@ impl Renderer {
 
     /// Adds the samples of `range`, which follows what is there. `progress` is called after each submission and may
     /// stop the render; then each pixel has at least one sample. Returns whether the range was finished.
+    ///
+    /// After an error the renderer has the samples of [`Renderer::samples`] and some bands of several more, so that
+    /// [`Renderer::render_rest`] goes on where that is possible; nothing is counted twice.
     pub fn render_range(
         &mut self,
         range: Range<u32>,
@@ -287,7 +314,7 @@ impl Renderer {
         if range.start >= range.end {
             return Err(Error::setting("samples", format!("{}:{} holds no sample", range.start, range.end)));
         }
-        if self.begin.is_some() && self.bands.iter().any(|band| band.end != range.start) {
+        if self.begin.is_some() && self.samples().end != range.start {
             let problem = format!("{}:{} does not follow {:?}", range.start, range.end, self.samples());
             return Err(Error::setting("samples", problem));
         }
@@ -297,16 +324,22 @@ impl Renderer {
         }
         let pixels: u64 = self.bands.iter().map(|band| u64::from(band.pixels)).sum();
         let mut state = Progress { done: 0, total: pixels * u64::from(range.end - range.start) };
+        let early = |band: &Band| u64::from(band.pixels) * u64::from(band.end.min(range.end) - range.start);
+        state.done += self.bands.iter().map(early).sum::<u64>();
         let mut stop = false;
         let mut pass = range.start..range.start + 1;
         while !pass.is_empty() {
             for band in 0..self.bands.len() {
-                let mut next = pass.start;
-                self.make_resident(band)?;
+                // Some are ahead after an interruption or an error.
+                let mut next = pass.start.max(self.bands[band].end);
+                if next < pass.end {
+                    self.make_resident(band)?;
+                }
                 while next < pass.end && !(stop && pass.start > range.start) {
                     let count = (SUBMISSION / u64::from(self.bands[band].pixels)).clamp(1, u64::from(PASS)) as u32;
                     let end = pass.end.min(next.saturating_add(count));
-                    self.submit_samples(band, next..end)?;
+                    self.submit_samples(band, next..end).inspect_err(|_| self.distrust(band))?;
+                    self.keep_in_time()?;
                     state.done += u64::from(self.bands[band].pixels) * u64::from(end - next);
                     next = end;
                     stop |= progress(&state).is_break();
@@ -320,42 +353,6 @@ impl Renderer {
             pass = pass.end..end.min(range.end);
         }
         Ok(self.samples().end == range.end)
-    }
-
-    /// Brings a band's sums onto the device, and those of the band that was there back to the host.
-    fn make_resident(&mut self, band: usize) -> Result<()> {
-        if self.resident == Some(band) {
-            return Ok(());
-        }
-        let _span = profile::begin(&self.settings.timeline, "band");
-        self.save_resident()?;
-        let film = std::mem::replace(&mut self.bands[band].film, Film::OnDevice);
-        let recorder = own(&mut self.recorder)?;
-        recorder.begin()?;
-        for (index, slot) in SUMS.into_iter().enumerate() {
-            let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
-            if film == Film::OnHost {
-                upload(&self.device, buffer, &self.bands[band].sums[index])?;
-            } else {
-                recorder.fill(buffer, 0);
-            }
-        }
-        recorder.submit_and_wait()?;
-        self.resident = Some(band);
-        self.strata = [None; BATCHES as usize];
-        Ok(())
-    }
-
-    fn save_resident(&mut self) -> Result<()> {
-        let Some(band) = self.resident.take() else { return Ok(()) };
-        let Band { pixels, film, sums, .. } = &mut self.bands[band];
-        for (data, slot) in sums.iter_mut().zip(SUMS) {
-            let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
-            data.resize((bands::bytes_per_pixel(slot) * u64::from(*pixels)) as usize, 0);
-            download_to(&self.device, buffer, data)?;
-        }
-        *film = Film::OnHost;
-        Ok(())
     }
 
     fn submit_samples(&mut self, band: usize, samples: Range<u32>) -> Result<()> {
@@ -394,10 +391,17 @@ impl Renderer {
         assemble::image(self, assemble::Sums::Kept)
     }
 
-    /// As [`Renderer::image`], for the last time: each band's sums are freed once they are read, so that a large image
-    /// needs the memory of its sums and not that of its channels on top.
+    /// As [`Renderer::image`], and forgets every sample: each band's sums are freed once they are read, so that a large
+    /// image needs the memory of its sums and not that of its channels on top.
+    pub fn take_image(&mut self) -> Result<Image> {
+        let image = assemble::image(self, assemble::Sums::Freed)?;
+        self.reset();
+        Ok(image)
+    }
+
+    /// As [`Renderer::take_image`], for the last time.
     pub fn finish(mut self) -> Result<Image> {
-        assemble::image(&mut self, assemble::Sums::Freed)
+        self.take_image()
     }
 
     /// The largest number of loop trips of any traversal so far; 0 unless made by [`Renderer::counting`].

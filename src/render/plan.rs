@@ -1,9 +1,9 @@
 //! What a scene and its settings require of a device, and why. [`Renderer`](super::Renderer) makes exactly this.
 
-use super::bands;
+use super::{bands, budget, host};
 use crate::{
     error::Result,
-    gpu::Device,
+    gpu::{Device, DeviceKind},
     prepare::{Prepared, prepare},
     scene::Scene,
     settings::Settings,
@@ -15,17 +15,32 @@ use crate::{
 pub struct Limits {
     /// Most bytes of one buffer.
     pub buffer_bytes: u64,
-    /// Bytes of the heap that buffers come from.
+    /// Bytes that are left of the memory that buffers come from.
     pub heap_bytes: u64,
+    /// Bytes that this process may still take of the host's memory.
+    pub host_bytes: u64,
+    /// What sets `host_bytes`, in words.
+    pub host_limit: &'static str,
+    /// Whether the device's buffers are in the host's memory: on a processor.
+    pub shared: bool,
 }
 
 impl Limits {
     /// A device that allows everything.
-    pub const NONE: Limits = Limits { buffer_bytes: u64::MAX, heap_bytes: u64::MAX };
+    pub const NONE: Limits = Limits {
+        buffer_bytes: u64::MAX,
+        heap_bytes: u64::MAX,
+        host_bytes: u64::MAX,
+        host_limit: "nothing",
+        shared: false,
+    };
 
-    /// Those of a device.
+    /// Those of a device, and of this process, as they are now.
     pub fn of(device: &Device) -> Limits {
-        Limits { buffer_bytes: device.max_storage_buffer_range(), heap_bytes: device.heap_size() }
+        let (host_bytes, host_limit) = host::left();
+        let shared = device.info().kind == DeviceKind::Cpu;
+        let heap_bytes = device.heap_left().min(if shared { host_bytes } else { u64::MAX });
+        Limits { buffer_bytes: device.max_storage_buffer_range(), heap_bytes, host_bytes, host_limit, shared }
     }
 }
 
@@ -66,7 +81,9 @@ impl Plan {
     /// As [`Renderer::new`](super::Renderer::new), but for what only a device can tell.
     pub fn new(scene: &Scene, settings: &Settings, limits: Limits) -> Result<Plan> {
         let prepared = prepare(scene, settings)?;
-        let bands: Vec<u32> = bands::split(limits, &prepared, settings)?.iter().map(|band| band.pixels).collect();
+        let bands = bands::split(limits, &prepared, settings)?;
+        budget::check(limits, scene, &prepared, &bands)?;
+        let bands: Vec<u32> = bands.iter().map(|band| band.pixels).collect();
         let largest = bands.iter().copied().max().unwrap_or(0);
         let kernels = super::SPIRV.iter().map(|&(stem, _)| {
             let (used, why) = needs(&prepared, stem);
@@ -90,12 +107,7 @@ impl Plan {
 
     /// Bytes of the sums that wait on the host while other bands have the device.
     pub fn waiting_bytes(&self) -> u64 {
-        if self.bands.len() == 1 {
-            return 0;
-        }
-        let kept = super::SUMS.into_iter().filter(|slot| self.buffers.iter().any(|b| b.slot == *slot && b.bytes > 0));
-        let each: u64 = kept.map(bands::bytes_per_pixel).sum();
-        self.bands.iter().map(|pixels| u64::from(*pixels) * each).sum()
+        if self.bands.len() == 1 { 0 } else { budget::waiting_bytes(&self.prepared, self.bands.iter().copied()) }
     }
 }
 

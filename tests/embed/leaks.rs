@@ -36,10 +36,10 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Functions that make and destroy objects, counted. All of a kind have the same arguments but for the types of
-/// pointers.
+/// Functions that make and destroy objects, counted. All have the same arguments but for the types of pointers and,
+/// in some, more after the device.
 macro_rules! counted {
-    ($($kind:ident: $create:literal, $destroy:literal;)*) => {
+    ($($kind:ident: $create:literal $(($($argument:ident: $type:ty),*))?, $destroy:literal;)*) => {
         $(mod $kind {
             use super::*;
 
@@ -48,17 +48,20 @@ macro_rules! counted {
             static CREATE: AtomicUsize = AtomicUsize::new(0);
             static DESTROY: AtomicUsize = AtomicUsize::new(0);
 
-            type Create =
-                unsafe extern "system" fn(vk::Device, *const c_void, *const c_void, *mut u64) -> vk::Result;
+            type Create = unsafe extern "system" fn(
+                vk::Device, $($($type,)*)? *const c_void, *const c_void, *mut u64,
+            ) -> vk::Result;
             type Destroy = unsafe extern "system" fn(vk::Device, u64, *const c_void);
 
             unsafe extern "system" fn create(
                 device: vk::Device,
+                $($($argument: $type,)*)?
                 info: *const c_void,
                 callbacks: *const c_void,
                 out: *mut u64,
             ) -> vk::Result {
-                let result = unsafe { transmute::<usize, Create>(CREATE.load(Relaxed))(device, info, callbacks, out) };
+                let real = unsafe { transmute::<usize, Create>(CREATE.load(Relaxed)) };
+                let result = unsafe { real(device, $($($argument,)*)? info, callbacks, out) };
                 if result == vk::Result::SUCCESS {
                     LIVE.fetch_add(1, Relaxed);
                     MADE.fetch_add(1, Relaxed);
@@ -88,7 +91,7 @@ macro_rules! counted {
         })*
 
         /// Objects that are alive, by kind.
-        fn live() -> Vec<(&'static str, isize)> {
+        pub fn live() -> Vec<(&'static str, isize)> {
             vec![$((stringify!($kind), $kind::LIVE.load(Relaxed)),)*]
         }
 
@@ -97,7 +100,7 @@ macro_rules! counted {
             vec![$((stringify!($kind), $kind::MADE.load(Relaxed)),)*]
         }
 
-        fn wrap(name: &CStr, mut function: vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction {
+        pub fn wrap(name: &CStr, mut function: vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction {
             $(function = $kind::wrap(name, function);)*
             function
         }
@@ -110,6 +113,7 @@ counted! {
     pipeline_layout: "vkCreatePipelineLayout", "vkDestroyPipelineLayout";
     descriptor_pool: "vkCreateDescriptorPool", "vkDestroyDescriptorPool";
     shader_module: "vkCreateShaderModule", "vkDestroyShaderModule";
+    pipeline: "vkCreateComputePipelines"(cache: u64, count: u32), "vkDestroyPipeline";
     command_pool: "vkCreateCommandPool", "vkDestroyCommandPool";
     fence: "vkCreateFence", "vkDestroyFence";
     query_pool: "vkCreateQueryPool", "vkDestroyQueryPool";

@@ -4,6 +4,7 @@
 mod app;
 mod c;
 mod device;
+mod faults;
 mod leaks;
 mod names;
 mod record;

@@ -1,6 +1,7 @@
 //! The program as a user meets it, and the images that it writes.
 
 mod bench;
+mod faults;
 mod image;
 mod inspect;
 mod interrupt;
