@@ -22,6 +22,7 @@ use translucent::{
     ash::vk,
     gpu::{Allocation, Allocator, MemoryRequest, RawDevice},
     measure::scenes::{Eye, Mesh, gltf, matter},
+    profile::Timeline,
 };
 
 /// What fails, and what was called since it was set.
@@ -259,7 +260,10 @@ fn every_call_of_a_render_may_fail() {
     let _alone = alone();
     let app = App::wrapped(wrap);
     let device = app.open();
-    sweep(&device, &Job::new(1, 8), FUNCTIONS);
+    let mut job = Job::new(1, 8);
+    // So that timestamps are read as well.
+    job.settings.timeline = Some(Timeline::new());
+    sweep(&device, &job, FUNCTIONS);
     drop(device);
     app.close();
 }
