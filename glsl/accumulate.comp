@@ -148,6 +148,7 @@ void main() {
     vec3 n = s.side * geometric_normal(triangles[lit]);
     vec3 shading_n = s.side * shading_normal(shadings[lit], lit, barycentric);
     vec3 position = s.position + delta;
+    float entry_share = roughness_share(lit, barycentric);
 
     vec3 entering = vec3(0.0);
     uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
@@ -202,7 +203,7 @@ void main() {
             if (k >= first_direction || found == target) hit_count = 0u;
         }
         if (open && hit_count == 0u) {
-            light *= crossing(local, cos_shading);
+            light *= crossing(local, cos_shading, entry_share);
             light *= obliqueness(local, cos_shading, false);
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
@@ -210,7 +211,9 @@ void main() {
     }
 
     float cos_eye = dot(s.shading_normal, s.wo);
-    vec3 radiance = crossing(m, cos_eye) * obliqueness(local, cos_eye, true) * factor * entering;
+    float exit_share = roughness_share(surface.triangle, surface.barycentric);
+    vec3 radiance = crossing(m, cos_eye, exit_share) * leaving_share(m, exit_share)
+        * obliqueness(local, cos_eye, true) * factor * entering;
     if (has_model(local, MODEL_TABLE)) radiance *= table_balance(local, surface);
     if (MIXED != 0) radiance *= m.exit;
     // The base colour tints what crosses the surface, there and here.

@@ -77,7 +77,7 @@ void main() {
         d = -refracted(s.wo, n, m.ior);
     }
     if (!(dot(d, n) < 0.0)) return;
-    vec3 leaving = vec3(crossing(m, dot(n, s.wo)));
+    vec3 leaving = vec3(crossing(m, dot(n, s.wo), roughness_share(surface.triangle, surface.barycentric)));
     if (has_texture(TEXTURE_BASE_COLOR)) {
         leaving *= texture_value(TEXTURE_BASE_COLOR, surface.triangle, surface.barycentric).rgb;
     }
@@ -182,7 +182,7 @@ void main() {
                     Material boundary = m;
                     if (MIXED != 0) boundary = materials[shadings[found].material];
                     part = over_density * scattered * exp_(exponent)
-                        * (crossing(boundary, c) * ratio / (m.ior * m.ior));
+                        * (crossing(boundary, c, roughness_share(found, hit_barycentric)) * ratio / (m.ior * m.ior));
                     if (has_texture(TEXTURE_BASE_COLOR)) {
                         part *= texture_value(TEXTURE_BASE_COLOR, found, hit_barycentric).rgb;
                     }

@@ -87,6 +87,12 @@ vec3 mapped_normal(vec3 n, uint triangle, vec2 barycentric) {
     return length2 > 0.0 ? turned / sqrt(length2) : n;
 }
 
+// The texture's share of the roughness at a point, for boundaries.
+float roughness_share(uint triangle, vec2 barycentric) {
+    if (ROUGH < 2 || !has_texture(TEXTURE_METALLIC_ROUGHNESS)) return 1.0;
+    return texture_value(TEXTURE_METALLIC_ROUGHNESS, triangle, barycentric).g;
+}
+
 // The material with its surface as the textures have it at a point.
 Material textured_surface(Material m, uint triangle, vec2 barycentric) {
     if (has_texture(TEXTURE_BASE_COLOR)) m.base_color *= texture_value(TEXTURE_BASE_COLOR, triangle, barycentric).rgb;

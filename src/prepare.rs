@@ -155,7 +155,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let details = Detail::of(scene, &camera, height);
     let advice: Vec<_> = scene.materials.iter().zip(details).map(|(m, d)| model::advise(settings, m, d)).collect();
     let thickness = sets::thickness(scene, settings, &advice);
-    let (mut profiles, mut boundaries) = (vec![], Boundaries::default());
+    let (mut profiles, mut boundaries) = (vec![], boundaries(scene, settings));
     let mut materials = materials(scene, settings, &advice, &thickness, &mut profiles, &mut boundaries)?;
     let balances = sets::balances(scene, &mut materials, &profiles, &thickness);
     let mixtures = sets::mixtures(scene, &materials)?;
@@ -211,7 +211,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         models,
         emitters: u32::from(emits),
         textures: kinds,
-        rough: u32::from(!boundaries.nodes.is_empty()),
+        rough: boundaries.feature(),
         curvature: u32::from(!thickness.is_empty()),
         recorded: u32::from(settings.recording),
         mixtures: u32::from(!mixtures.is_empty()),
@@ -233,7 +233,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         lights,
         emitters,
         emitter_cdf,
-        boundaries: boundaries.nodes,
+        boundaries: boundaries.values,
         environment,
         environment_cdf,
         texels,
@@ -246,6 +246,14 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
         camera,
         rows: y0..y1,
     })
+}
+
+/// No rough boundary yet; a row for each step of the roughness where a texture changes that of translucent matter.
+fn boundaries(scene: &Scene, settings: &Settings) -> Boundaries {
+    let textured = |m: &scene::Material| {
+        m.medium.is_some() && m.roughness > 0.0 && m.textures[shared::TEXTURE_METALLIC_ROUGHNESS as usize].is_some()
+    };
+    Boundaries::new(scene.materials.iter().any(textured), settings.normalisation)
 }
 
 /// The camera's part of a View, in internal units.
@@ -391,7 +399,7 @@ pub(crate) fn replaced(
     if translucent && !same_boundary || (old.roughness > 0.0) != (new.roughness > 0.0) {
         return refuse("another rough boundary needs a new renderer");
     }
-    let mut boundaries = Boundaries::default();
+    let mut boundaries = Boundaries::new(false, settings.normalisation);
     let common = Common { frame, settings, thickness: &[], mixed: false };
     let mut made = material(new, choice, common, &mut vec![], &mut boundaries)?;
     // The same roughness and index have the same table.
@@ -488,7 +496,7 @@ fn material(
             let constant = |model: Model| profile::constant(model).expect("a choice is a built model");
             let rough = (alpha > 0.0).then(|| boundaries.add(alpha.into(), material.ior));
             let coefficients = [0, 1, 2].map(|c| Coefficients {
-                rough: rough.map(|(_, reflectance)| reflectance),
+                rough: rough.map(|(_, rough)| rough),
                 ..coefficients(medium, material.ior, frame.scale, c)
             });
             let options = profile::Options {

@@ -193,6 +193,11 @@ constants! {
     EMITTER_REACH: f32 = 0.999_996_2;
     /// Values of a rough boundary's transmittance, at cosines (i / (BOUNDARY_NODES - 1))^2.
     BOUNDARY_NODES: u32 = 128;
+    /// Numbers in a row of a rough boundary's table: the transmittance at the nodes, then what radiance that leaves is
+    /// divided by, 1 - rho_e or 1.
+    BOUNDARY_ROW: u32 = 129;
+    /// Rows of a boundary whose roughness a texture changes, at the shares (i / (ROUGHNESS_ROWS - 1))^2 of the factor.
+    ROUGHNESS_ROWS: u32 = 33;
     /// Least GGX width of an opaque material, which has no mirror.
     OPAQUE_ALPHA_MIN: f32 = 1e-3;
     /// Most media of one set of surfaces that exchange light.
@@ -765,7 +770,7 @@ buffers! {
     Profiles = 20: PROFILES [f32] profiles;
     /// At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
     Thickness = 21: THICKNESS [Vec3] thickness;
-    /// BOUNDARY_NODES values of the transmittance of each rough boundary.
+    /// Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
     Boundaries = 22: BOUNDARIES [f32] boundaries;
     /// One Progress.
     Progresses = 23: PROGRESSES [Progress] progresses;
@@ -790,7 +795,7 @@ features! {
     counters = 4: COUNT_STEPS,
     /// 1 where triangles emit light.
     emitters = 6: EMISSIVE,
-    /// 1 where a translucent material is rough.
+    /// Rows of a rough boundary's table: 1, or ROUGHNESS_ROWS where textures change roughness; 0 without such boundaries.
     rough = 9: ROUGH,
     /// Bit k is set where a material has a texture of kind k (TEXTURE_*).
     textures = 7: TEXTURED,

@@ -29,7 +29,7 @@ use super::projection::{
     Seen, balance, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal,
 };
 use super::random::{batch, key, scramble, sobol, unit};
-use super::rough::crossing;
+use super::rough::{crossing, leaving_share};
 use super::sample::coordinate;
 use super::sums::Contribution;
 use super::{Inputs, emitter, intersect, mixture, texture};
@@ -111,9 +111,11 @@ pub fn accumulate(
     let entry = Entry::new(inputs, material, seen.side, point, triangle);
     let local = texture::medium(inputs, material, triangle, entry.weights);
     let local = Matter { material: &local, ..matter };
+    let exit_share = texture::roughness_share(inputs, surface.triangle, surface.barycentric.as_dvec2());
     let leaving = entry.tint
         * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
-        * crossing(inputs, matter.material, seen.shading_normal.dot(seen.wo))
+        * crossing(inputs, matter.material, seen.shading_normal.dot(seen.wo), exit_share)
+        * leaving_share(inputs, matter.material, exit_share)
         * profile::obliqueness(local, seen.shading_normal.dot(seen.wo), true)
         * balance(inputs, material, surface)
         * if inputs.mixtures.is_empty() { DVec3::ONE } else { matter.material.exit.as_dvec3() };
@@ -237,6 +239,8 @@ struct Entry<'a> {
     tint: DVec3,
     /// Weights of the second and third vertex.
     weights: DVec2,
+    /// Share of the material's roughness.
+    roughness: f64,
 }
 
 impl<'a> Entry<'a> {
@@ -246,13 +250,18 @@ impl<'a> Entry<'a> {
         let shading = side * shading_normal(inputs, triangle, weights);
         let tint = tint(inputs, triangle, weights);
         let normal = side * geometric_normal(shape);
-        Entry { inputs, material, point, normal, shading, tint, weights }
+        let roughness = texture::roughness_share(inputs, triangle, weights);
+        Entry { inputs, material, point, normal, shading, tint, weights, roughness }
     }
 
     /// Ft(wi) cos; 0 below either horizon.
     fn transmission(&self, wi: DVec3) -> f64 {
         let cos = self.shading.dot(wi);
-        if self.normal.dot(wi) > 0.0 && cos > 0.0 { crossing(self.inputs, self.material, cos) * cos } else { 0.0 }
+        if self.normal.dot(wi) > 0.0 && cos > 0.0 {
+            crossing(self.inputs, self.material, cos, self.roughness) * cos
+        } else {
+            0.0
+        }
     }
 }
 

@@ -84,6 +84,11 @@ pub fn moment(n: f64, k: i32, side: Side) -> f64 {
     }
 }
 
+/// Cosine of refraction of light that arrives from outside at the cosine `cos`; 0 where it does not enter.
+pub fn cos_refracted(n: f64, cos: f64) -> f64 {
+    (1.0 - (1.0 - cos) * (1.0 + cos) / (n * n)).max(0.0).sqrt()
+}
+
 /// Diffuse reflectance of the surface for light from `side`, 2 C_1, 0 to 1.
 pub fn diffuse_reflectance(n: f64, side: Side) -> f64 {
     let dense = if n > 1.0 { n } else { 1.0 / n };

@@ -21,14 +21,18 @@
 //! 1.3 to 1.5 the interpolation's is below 3e-4 from roughness .1 and 3e-5 from .3 (tests/physics/rough.rs); below .1 it
 //! reaches 1e-3 and more where the cosine is of the order of alpha.
 //!
-//! Where a texture changes the roughness, boundary and rho_e are those of the material's factor. Models but the
-//! standard dipole keep the inner moments of the smooth boundary, and the directional dipole and the table its rho_e in the
-//! dependence on direction: with them T is rough, too, but a furnace closes only about as well as T is like 1 - F.
+//! Where a texture changes the roughness, the table has ROUGHNESS_ROWS such rows, at equal steps of the root of its share
+//! from 0, and is linear between them, too, to 1e-3 of T from a roughness of .1. T is that of the place where light enters,
+//! T and 1 - rho_e those of the place where it leaves. Inside, matter knows one boundary, that of the material's factor.
+//!
+//! The standard dipole takes its inner moment from rho_e; other models keep those of the smooth boundary. The directional
+//! dipole keeps rho_e in its dependence on direction: with it a furnace closes only about as well as T is like 1 - F.
 
 use super::Inputs;
-use super::boundary::{smith_g1, smith_g2, transmittance};
+use super::boundary::{cos_refracted, smith_g1, smith_g2, transmittance};
 use super::math::integrate;
-use crate::shared::{BOUNDARY_NODES, Material};
+use crate::Normalisation;
+use crate::shared::{BOUNDARY_NODES, BOUNDARY_ROW, Material, ROUGHNESS_ROWS};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -90,37 +94,79 @@ fn intervals(low: f64, high: f64, f: impl Fn(f64) -> f64) -> impl Iterator<Item 
     (0..ends.len() / 2).map(move |k| (ends[2 * k], ends[2 * k + 1]))
 }
 
+/// What matter knows of a rough boundary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rough {
+    /// Diffuse reflectance rho_e from outside.
+    pub reflectance: f64,
+    /// Mean of 1 - mu' over diffuse light that has entered, mu' the cosine of refraction.
+    pub obliqueness: f64,
+}
+
 /// The tables of a scene's rough boundaries.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Boundaries {
-    /// BOUNDARY_NODES values for each.
-    pub nodes: Vec<f32>,
-    /// (alpha, n, rho_e) of each.
-    known: Vec<(f64, f64, f64)>,
+    /// Rows of BOUNDARY_ROW numbers, for each boundary as many.
+    pub values: Vec<f32>,
+    /// 1, or ROUGHNESS_ROWS where textures change the roughness.
+    rows: u32,
+    normalisation: Normalisation,
+    /// alpha, n and what came of them.
+    known: Vec<(f64, f64, Rough)>,
 }
 
 impl Boundaries {
-    /// [`Material::boundary`] of a roughness `alpha` > 0 and index of refraction, and the diffuse reflectance rho_e from
-    /// outside.
-    pub fn add(&mut self, alpha: f64, n: f64) -> (u32, f64) {
+    /// No boundary yet; `textured` where textures change the roughness.
+    pub fn new(textured: bool, normalisation: Normalisation) -> Boundaries {
+        let rows = if textured { ROUGHNESS_ROWS } else { 1 };
+        Boundaries { values: vec![], rows, normalisation, known: vec![] }
+    }
+
+    /// [`Features::rough`](crate::shared::Features::rough).
+    pub fn feature(&self) -> u32 {
+        if self.known.is_empty() { 0 } else { self.rows }
+    }
+
+    /// [`Material::boundary`] of a roughness `alpha` > 0 and index of refraction, and what matter knows of it.
+    pub fn add(&mut self, alpha: f64, n: f64) -> (u32, Rough) {
         if let Some(place) = self.known.iter().position(|known| (known.0, known.1) == (alpha, n)) {
             return (place as u32 + 1, self.known[place].2);
         }
-        let last = f64::from(BOUNDARY_NODES - 1);
-        let nodes: Vec<f32> = (0..BOUNDARY_NODES)
-            .into_par_iter()
-            .map(|i| (1.0 - reflected(alpha, n, (f64::from(i) / last).powi(2))) as f32)
-            .collect();
-        // With c = t^2; a polynomial of degree 4 between nodes.
-        let part = |i: u32| {
-            let (t0, t1) = (f64::from(i) / last, f64::from(i + 1) / last);
-            integrate(t0, t1, 1, |t| 4.0 * t.powi(3) * interpolated(&nodes, t * t))
-        };
-        let rho_e = 1.0 - (0..BOUNDARY_NODES - 1).map(part).sum::<f64>();
-        self.nodes.extend(&nodes);
-        self.known.push((alpha, n, rho_e));
-        (self.known.len() as u32, rho_e)
+        let mut rough = Rough { reflectance: 0.0, obliqueness: 0.0 };
+        for row in 1..=self.rows {
+            // The last row is the factor's; roughness is the root of alpha.
+            let root = if self.rows == 1 { 1.0 } else { f64::from(row - 1) / f64::from(self.rows - 1) };
+            let nodes = nodes(alpha * root.powi(4), n);
+            let crossing = mean(&nodes, |_| 1.0);
+            rough.reflectance = 1.0 - crossing;
+            rough.obliqueness = mean(&nodes, |cos| 1.0 - cos_refracted(n, cos)) / crossing;
+            self.values.extend(&nodes);
+            self.values.push(match self.normalisation {
+                Normalisation::Energy => crossing as f32,
+                Normalisation::Jensen2001 => 1.0,
+            });
+        }
+        self.known.push((alpha, n, rough));
+        (self.known.len() as u32, rough)
     }
+}
+
+/// T at the nodes; without roughness that of Fresnel.
+fn nodes(alpha: f64, n: f64) -> Vec<f32> {
+    let crossing = |cos: f64| if alpha > 0.0 { 1.0 - reflected(alpha, n, cos) } else { transmittance(n, cos) };
+    let last = f64::from(BOUNDARY_NODES - 1);
+    (0..BOUNDARY_NODES).into_par_iter().map(|i| crossing((f64::from(i) / last).powi(2)) as f32).collect()
+}
+
+/// 2 int T f c dc, by the interpolation of T.
+fn mean(nodes: &[f32], f: impl Fn(f64) -> f64) -> f64 {
+    let last = f64::from(BOUNDARY_NODES - 1);
+    // With c = t^2; T is a polynomial of degree 1 in t between nodes.
+    let part = |i: u32| {
+        let (t0, t1) = (f64::from(i) / last, f64::from(i + 1) / last);
+        integrate(t0, t1, 1, |t| 4.0 * t.powi(3) * interpolated(nodes, t * t) * f(t * t))
+    };
+    (0..BOUNDARY_NODES - 1).map(part).sum()
 }
 
 /// T at a cosine, from one table.
@@ -131,11 +177,37 @@ pub fn interpolated(nodes: &[f32], cos: f64) -> f64 {
     low + (x - i as f64) * (high - low)
 }
 
-/// Share of the light at a cosine outside that crosses the surface of a translucent material.
-pub fn crossing(inputs: &Inputs, material: &Material, cos: f64) -> f64 {
+/// Rows of a material's boundary around a share of its roughness, and the weight of the second.
+fn rows<'a>(inputs: &Inputs<'a>, material: &Material, share: f64) -> ([&'a [f32]; 2], f64) {
+    let rows = inputs.features.rough as usize;
+    let row = |i: usize| &inputs.boundaries[i * BOUNDARY_ROW as usize..][..BOUNDARY_ROW as usize];
+    let first = (material.boundary as usize - 1) * rows;
+    if rows == 1 {
+        return ([row(first); 2], 0.0);
+    }
+    let y = share.clamp(0.0, 1.0).sqrt() * (rows - 1) as f64;
+    let below = (y as usize).min(rows - 2);
+    ([row(first + below), row(first + below + 1)], y - below as f64)
+}
+
+/// Share of the light at a cosine outside that crosses the surface of a translucent material, where the texture has this
+/// share of its roughness.
+pub fn crossing(inputs: &Inputs, material: &Material, cos: f64, share: f64) -> f64 {
     if material.boundary == 0 {
         return transmittance(material.ior.into(), cos);
     }
-    let nodes = BOUNDARY_NODES as usize;
-    interpolated(&inputs.boundaries[(material.boundary as usize - 1) * nodes..][..nodes], cos)
+    let (rows, above) = rows(inputs, material, share);
+    let [low, high] = rows.map(|row| interpolated(&row[..BOUNDARY_NODES as usize], cos));
+    low + above * (high - low)
+}
+
+/// What a texture of the roughness makes of radiance that leaves, besides its crossing: rho_e is that of the place.
+pub fn leaving_share(inputs: &Inputs, material: &Material, share: f64) -> f64 {
+    if material.boundary == 0 {
+        return 1.0;
+    }
+    let last = |row: &[f32]| f64::from(row[BOUNDARY_NODES as usize]);
+    let ([low, high], above) = rows(inputs, material, share);
+    let ([_, factor], _) = rows(inputs, material, 1.0);
+    last(factor) / (last(low) + above * (last(high) - last(low)))
 }

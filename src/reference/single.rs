@@ -51,6 +51,7 @@ use super::projection::{geometric_normal, material, seen, shading_normal};
 use super::random::{batch, key, scramble, unit};
 use super::rough::crossing;
 use super::sums::Contribution;
+use super::texture;
 use super::{Inputs, emitter, intersect, mixture};
 use crate::shared::{
     DIM_SINGLE, DIM_SINGLE_EMITTER, DIM_SINGLE_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, MISS, Material, SHADOW_OFFSET,
@@ -212,7 +213,9 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
         let cos_inside = inner.dot(shading);
         let along =
             if hit.triangle == surface.triangle { -depth * d.dot(outward) / wi.dot(outward) } else { hit.t.max(0.0) };
-        let flux = crossing(inputs, mixture::entered(inputs, material, hit.triangle), c) * c / cos_inside / (ior * ior);
+        let entered = mixture::entered(inputs, material, hit.triangle);
+        let roughness = texture::roughness_share(inputs, hit.triangle, hit.barycentric);
+        let flux = crossing(inputs, entered, c, roughness) * c / cos_inside / (ior * ior);
         let channel = |i: usize| {
             // sigma_s p e^(-sigma_t (depth + way)) over the density of the depth, all exponents together.
             let density = |k: usize| {
@@ -257,8 +260,10 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
         Some(part * radiance / each)
     };
     let light: DVec3 = (step.ray_begin..step.ray_begin + step.ray_count).filter_map(lit).sum();
-    let leaving = crossing(inputs, material, normal.dot(seen.wo));
-    Contribution::of(leaving * tint(inputs, surface.triangle, surface.barycentric.as_dvec2()) * light)
+    let barycentric = surface.barycentric.as_dvec2();
+    let roughness = texture::roughness_share(inputs, surface.triangle, barycentric);
+    let leaving = crossing(inputs, material, normal.dot(seen.wo), roughness);
+    Contribution::of(leaving * tint(inputs, surface.triangle, barycentric) * light)
 }
 
 fn on_triangle(triangle: &Triangle, barycentric: DVec2) -> DVec3 {

@@ -128,6 +128,14 @@ pub fn mapped_normal(inputs: &Inputs, normal: DVec3, triangle: u32, barycentric:
     (scale * v.x * tangent + scale * v.y * bitangent + v.z * normal).try_normalize().unwrap_or(normal)
 }
 
+/// The texture's share of the roughness at a point, for boundaries.
+pub fn roughness_share(inputs: &Inputs, triangle: u32, barycentric: DVec2) -> f64 {
+    if inputs.features.rough < 2 {
+        return 1.0;
+    }
+    value(inputs, TEXTURE_METALLIC_ROUGHNESS, triangle, barycentric).y
+}
+
 /// The material with its surface as the textures have it at a point.
 pub fn surface(inputs: &Inputs, material: &Material, triangle: u32, barycentric: DVec2) -> Material {
     let value = |kind: u32| value(inputs, kind, triangle, barycentric);

@@ -24,7 +24,7 @@
 use super::grid;
 use super::single::Matter;
 use super::walk::{CELLS, Estimate, FIRST, Incidence, Leaving, Walk, reached};
-use crate::reference::boundary::{Side, diffuse_reflectance, transmittance};
+use crate::reference::boundary::{Side, cos_refracted, diffuse_reflectance, transmittance};
 use crate::reference::math::integrate;
 use crate::reference::profile::{Dipole, Radial, boundary_factor};
 use std::f64::consts::PI;
@@ -445,8 +445,7 @@ pub fn mean_obliqueness(ior: f64) -> f64 {
     integrate(0.0, 1.0, 4, |t| {
         // Smooth in t at grazing incidence.
         let mu = least + (1.0 - least) * t * t;
-        let inside = (1.0 - (1.0 - mu) * (1.0 + mu) / (ior * ior)).max(0.0).sqrt();
-        (1.0 - inside) * transmittance(ior, mu) * 2.0 * mu * (1.0 - least) * 2.0 * t
+        (1.0 - cos_refracted(ior, mu)) * transmittance(ior, mu) * 2.0 * mu * (1.0 - least) * 2.0 * t
     }) / entered
 }
 

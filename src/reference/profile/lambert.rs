@@ -12,7 +12,7 @@
 use super::{COMPONENTS, Coefficients, Dipole, Matter, Options, Profile, Radial};
 use crate::reference::boundary::Side;
 use crate::shared::{MODEL_LAMBERT, MODEL_TABLE, Material, TRANSLUCENT};
-use crate::table::{self, white::mean_obliqueness};
+use crate::table;
 use glam::DVec3;
 
 /// One channel of the opaque limit.
@@ -48,7 +48,7 @@ pub fn limit(of: u32, matter: &[Coefficients; 3], options: Options) -> Material 
     if of == MODEL_TABLE {
         let slope = |c: usize| table::channel(&matter[c]).map_or(0.0, |c| c.profile(f64::INFINITY).slope());
         material.slope = DVec3::new(slope(0), slope(1), slope(2)).as_vec3();
-        material.obliqueness = mean_obliqueness(ior) as f32;
+        material.obliqueness = matter[0].mean_obliqueness() as f32;
     }
     material
 }

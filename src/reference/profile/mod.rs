@@ -32,13 +32,14 @@ pub use standard::{Dipole, boundary_factor, invert_total};
 pub use table::Tabulated;
 
 use super::boundary::{Side, diffuse_reflectance};
+use super::rough::Rough;
 use crate::scene::{LengthKind, Medium};
 use crate::settings::{self, Model, Normalisation};
 use crate::shared::{
     self, MODEL_BETTER, MODEL_BURLEY, MODEL_DIRECTIONAL, MODEL_LAMBERT, MODEL_STANDARD, MODEL_TABLE, Material,
     RECIPROCAL, TRANSLUCENT,
 };
-use crate::table::block::Block;
+use crate::table::{block::Block, white::mean_obliqueness};
 use glam::DVec3;
 use std::f64::consts::PI;
 use std::ops::Deref;
@@ -60,8 +61,8 @@ pub struct Coefficients {
     pub g: f64,
     /// Index of refraction, inside over outside, > 0.
     pub ior: f64,
-    /// Diffuse reflectance from outside of a rough boundary; none for a smooth one, whose is exact.
-    pub rough: Option<f64>,
+    /// Of a rough boundary; a smooth one's numbers are exact.
+    pub rough: Option<Rough>,
     /// The total (0 to 1) and length that an author gave in place of coefficients.
     pub appearance: Option<(f64, f64, LengthKind)>,
 }
@@ -83,10 +84,15 @@ impl Coefficients {
     pub fn diffuse_reflectance(&self, side: Side) -> f64 {
         match (self.rough, side) {
             (None, side) => diffuse_reflectance(self.ior, side),
-            (Some(outside), Side::Outside) => outside,
+            (Some(rough), Side::Outside) => rough.reflectance,
             // Light in equilibrium crosses alike from both sides.
-            (Some(outside), Side::Inside) => 1.0 - (1.0 - outside) / (self.ior * self.ior),
+            (Some(rough), Side::Inside) => 1.0 - (1.0 - rough.reflectance) / (self.ior * self.ior),
         }
+    }
+
+    /// Mean of 1 - mu' over diffuse light that has entered, mu' the cosine of refraction.
+    pub fn mean_obliqueness(&self) -> f64 {
+        self.rough.map_or_else(|| mean_obliqueness(self.ior), |rough| rough.obliqueness)
     }
 
     /// The same matter in units of which the present one has `scale`.
@@ -365,7 +371,7 @@ pub fn tabulated(
     let block = Block::new(&matter.each_ref().map(crate::table::channel), spheres);
     out.table = tables.len() as u32;
     (out.table_first, out.table_cells, out.table_nodes) = (block.first, block.cells, block.nodes);
-    out.obliqueness = crate::table::white::mean_obliqueness(matter[0].ior) as f32;
+    out.obliqueness = matter[0].mean_obliqueness() as f32;
     tables.extend(block.data);
     out
 }

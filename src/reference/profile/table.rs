@@ -15,6 +15,7 @@
 //! paths can be reversed, at the exit, divided there by its mean.
 
 use super::{COMPONENTS, Coefficients, Matter, Options, Radial};
+use crate::reference::boundary::cos_refracted;
 use crate::shared::Material;
 use crate::table::{
     self,
@@ -236,9 +237,7 @@ pub(super) fn slope(matter: Matter) -> DVec3 {
 /// The factor 1 + k (1 - mu') on light that enters, or 1 over its mean times it on light that leaves, at the cosine
 /// outside.
 pub(super) fn obliqueness(material: &Material, slope: DVec3, cos: f64, leaving: bool) -> DVec3 {
-    let n = f64::from(material.ior);
-    let inside = (1.0 - (1.0 - cos * cos) / (n * n)).max(0.0).sqrt();
-    let factor = DVec3::ONE + slope * (1.0 - inside);
+    let factor = DVec3::ONE + slope * (1.0 - cos_refracted(material.ior.into(), cos));
     if leaving { factor / (DVec3::ONE + slope * f64::from(material.obliqueness)) } else { factor }
 }
 
