@@ -42,6 +42,26 @@ fn mean_over_middle(f: impl Fn(f64) -> f64) -> f64 {
     values.sum::<f64>() / 256.0
 }
 
+/// A mean of many deviations with their standard errors; the three channels of a ball, of the same radii, count as one.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    sum: f64,
+    squares: f64,
+    count: f64,
+}
+
+impl Mean {
+    fn add(&mut self, deviation: f64, error: f64) {
+        self.sum += deviation;
+        self.squares += 3.0 * error * error;
+        self.count += 1.0;
+    }
+
+    fn get(self) -> (f64, f64) {
+        (self.sum / self.count, self.squares.sqrt() / self.count)
+    }
+}
+
 #[test]
 fn every_matter_has_its_radiance() {
     let albedos = [[0.0, 1e-6, 0.5], [0.999, 1.0 - 0.5f64.powi(24), 1.0]];
@@ -73,6 +93,7 @@ fn every_matter_has_its_radiance() {
         assert!(image.channels.iter().all(|channel| channel.data.iter().all(|x| x.is_finite())));
         // The directional dipole has no closed form on a ball.
         let (Some(constant), false) = (profile::constant(model), model == Model::Directional) else { continue };
+        let mut relative = [Mean::default(); 2];
         for (index, (extinction, ior, albedo)) in cases.iter().enumerate() {
             let leaving = mean_over_middle(|cos| transmittance(*ior, cos));
             for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
@@ -96,8 +117,17 @@ fn every_matter_has_its_radiance() {
                 let unseen = if *extinction < 1.0 { 1e-6 } else { 0.0 };
                 let allowed = 5.0 * error + (deficit + 1e-3) * expected + unseen;
                 assert!((mean - expected).abs() <= allowed, "{what}, not {expected}");
-                assert!(error <= 0.2 * expected.max(1e-3), "{what}: no force");
+                if *extinction >= 1.0 && expected > 0.0 {
+                    assert!(error <= expected / 8.0, "{what}: no force");
+                    relative[usize::from(*extinction > 1.0)].add(mean / expected - 1.0, error / expected);
+                }
             }
+        }
+        for (mean, least) in relative.iter().zip([0.025, 0.012]) {
+            let (mean, error) = mean.get();
+            println!("{model}: all matter together is {mean:.4} +- {error:.4} off");
+            assert!(mean.abs() <= 4.0 * error + deficit + 1e-3, "{model}: {mean} +- {error}");
+            assert!(error < least, "{model}: {error} has no force");
         }
     }
 }
