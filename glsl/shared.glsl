@@ -29,6 +29,11 @@ const float SHADOW_OFFSET = 3.8146973e-6;
 const float EMITTER_REACH = 0.9999962;
 // Values of a rough boundary's transmittance, at cosines (i / (BOUNDARY_NODES - 1))^2.
 const uint BOUNDARY_NODES = 128u;
+// Numbers in a row of a rough boundary's table: the transmittance at the nodes, then what radiance that leaves is
+// divided by, 1 - rho_e or 1.
+const uint BOUNDARY_ROW = 129u;
+// Rows of a boundary whose roughness a texture changes, at the shares (i / (ROUGHNESS_ROWS - 1))^2 of the factor.
+const uint ROUGHNESS_ROWS = 33u;
 // Least GGX width of an opaque material, which has no mirror.
 const float OPAQUE_ALPHA_MIN = 0.001;
 // Most media of one set of surfaces that exchange light.
@@ -237,7 +242,7 @@ layout(constant_id = 3) const uint BATCHED = 0;
 layout(constant_id = 4) const uint COUNT_STEPS = 0;
 // 1 where triangles emit light.
 layout(constant_id = 6) const uint EMISSIVE = 0;
-// 1 where a translucent material is rough.
+// Rows of a rough boundary's table: 1, or ROUGHNESS_ROWS where textures change roughness; 0 without such boundaries.
 layout(constant_id = 9) const uint ROUGH = 0;
 // Bit k is set where a material has a texture of kind k (TEXTURE_*).
 layout(constant_id = 7) const uint TEXTURED = 0;
@@ -611,7 +616,7 @@ struct Pixel {
 #define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { float profiles[]; }
 // At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
 #define THICKNESS(access) layout(set = 0, binding = 21, scalar) access buffer ThicknessBlock { vec3 thickness[]; }
-// BOUNDARY_NODES values of the transmittance of each rough boundary.
+// Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
 #define BOUNDARIES(access) layout(set = 0, binding = 22, scalar) access buffer BoundariesBlock { float boundaries[]; }
 // One Progress.
 #define PROGRESSES(access) layout(set = 0, binding = 23, scalar) access buffer ProgressesBlock { Progress progresses[]; }

@@ -17,7 +17,7 @@ use translucent::{
         rough::{Boundaries, interpolated},
     },
     scene::Environment,
-    shared::MODEL_STANDARD,
+    shared::{BOUNDARY_NODES, MODEL_STANDARD},
 };
 
 const IOR: f64 = 1.4;
@@ -145,7 +145,7 @@ fn across_a_seam_of_a_plane_every_entry_sends_out_its_own_total() {
     let mut materials = [medium(0, "standard"), medium(1, "standard")];
     materials[1]["extras"]["bssrdf"]["surface"] = json!("rough");
     materials[1]["pbrMetallicRoughness"] = json!({"roughnessFactor": roughness});
-    let mut boundaries = Boundaries::default();
+    let mut boundaries = Boundaries::new(false, Normalisation::Energy);
     let (_, rho_rough) = boundaries.add(roughness * roughness, IOR);
     let of = |index: usize, c: usize| Coefficients {
         sigma_s_prime: MEDIA[index].0[c],
@@ -168,7 +168,7 @@ fn across_a_seam_of_a_plane_every_entry_sends_out_its_own_total() {
         let own = usize::from(s > 0.0);
         let leaving = match own {
             0 => translucent::reference::boundary::transmittance(IOR, cos),
-            _ => interpolated(&boundaries.nodes, cos),
+            _ => interpolated(&boundaries.values[..BOUNDARY_NODES as usize], cos),
         } / entering[own];
         let tints = [DVec3::ONE, brown];
         for (c, (mean, error)) in means(&image).into_iter().enumerate() {
