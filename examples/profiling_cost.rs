@@ -1,5 +1,5 @@
-//! What profiling costs: the same render in turns without and with a timeline, and the ratio of the two in wall time and
-//! in time of all cores (Linux), with its interval.
+//! What profiling costs: the same render in turns without and with a timeline, and the ratio of the two in wall time
+//! and in time of all cores (Linux), with its interval.
 //!
 //!     cargo run --release --example profiling_cost -- assets/spot.glb [SIZE [SAMPLES [PAIRS]]]
 

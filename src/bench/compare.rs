@@ -35,13 +35,13 @@ impl Comparison {
     }
 }
 
-/// Compares each kernel's times and the host's by [`ratio`], every one at the confidence that makes all of them together
-/// as sure as `confidence` (C. E. Bonferroni). One differs if its interval leaves out every ratio from 1 / (1 + `least`) to
-/// 1 + `least`, or if one run alone has it; `least` = 0 counts every difference.
+/// Compares each kernel's times and the host's by [`ratio`], every one at the confidence that makes all of them
+/// together as sure as `confidence` (C. E. Bonferroni). One differs if its interval leaves out every ratio from 1 / (1
+/// + `least`) to 1 + `least`, or if one run alone has it; `least` = 0 counts every difference.
 ///
 /// # Errors
-/// [`Error::Setting`] if the work is not the same, with what is not, or a series has too few repeats to tell anything, or
-/// more than [`MAX_REPEATS`].
+/// [`Error::Setting`] if the work is not the same, with what is not, or a series has too few repeats to tell anything,
+/// or more than [`MAX_REPEATS`].
 pub fn compare(a: &Report, b: &Report, confidence: f64, least: f64) -> Result<Comparison> {
     let mut unlike = Vec::new();
     differences("", &a.work, &b.work, &mut unlike);

@@ -1,10 +1,11 @@
-//! Fixed work, timed again and again: the same scene, settings, samples and random numbers, so that two runs, two drivers
-//! or two commits can be compared, and [`compare`] says which kernels differ beyond noise.
+//! Fixed work, timed again and again: the same scene, settings, samples and random numbers, so that two runs, two
+//! drivers or two commits can be compared, and [`compare`] says which kernels differ beyond noise.
 //!
-//! A [`Report`] holds a time for each kernel and repeat, so that whoever reads it can do his own statistics. What is said
-//! here assumes that repeats are independent. What all repeats of one process have in common (where its memory lies, what
-//! else the machine did meanwhile) is no noise to them: a difference beyond noise is one between the two runs, and between
-//! the commits only if the machine was idle and the order of runs does not matter. Run them in turns to be sure.
+//! A [`Report`] holds a time for each kernel and repeat, so that whoever reads it can do his own statistics. What is
+//! said here assumes that repeats are independent. What all repeats of one process have in common (where its memory
+//! lies, what else the machine did meanwhile) is no noise to them: a difference beyond noise is one between the two
+//! runs, and between the commits only if the machine was idle and the order of runs does not matter. Run them in turns
+//! to be sure.
 
 mod compare;
 mod report;
@@ -16,7 +17,7 @@ pub use report::{Report, Series};
 use crate::{
     Error, Result,
     gpu::{Device, Executable, Statistic},
-    profile::{Span, Track},
+    profile::{Counted, Span, Track},
     render::{Renderer, spirv_hash},
     scene::Scene,
     settings::Settings,
@@ -41,9 +42,9 @@ pub struct Effort {
     pub repeat: u32,
 }
 
-/// Renders `scene` again and again, image included. What [`Settings::timeline`] holds so far, such as the time of loading
-/// and opening, becomes a part of the report's start-up; it is cleared between repeats. `progress` hears how many repeats
-/// are done, those of the warm-up first.
+/// Renders `scene` again and again, image included. What [`Settings::timeline`] holds so far, such as the time of
+/// loading and opening, becomes a part of the report's start-up; it is cleared between repeats. `progress` hears how
+/// many repeats are done, those of the warm-up first.
 ///
 /// # Errors
 /// As [`Renderer::new`] and [`Renderer::render`]; [`Error::Setting`] for a number of samples or repeats that cannot be.
@@ -80,6 +81,7 @@ pub fn run(
                 report.add_kernel(times.kernel, times.count, times.total * 1e-6);
             }
         }
+        report.counters = counters(&timeline.counters());
         timeline.clear();
         progress(done + 1);
     }
@@ -112,6 +114,16 @@ fn executables(renderer: &Renderer) -> Result<Value> {
     let named = found.map(|(stem, list)| (stem.to_string(), list.iter().map(executable).collect()));
     let named: serde_json::Map<String, Value> = named.collect();
     Ok(if named.is_empty() { Value::Null } else { named.into() })
+}
+
+/// What was counted, as JSON; null where nothing was.
+fn counters(counted: &[Counted]) -> Value {
+    let each = |counted: &Counted| {
+        json!({
+            "kernel": counted.kernel, "counter": counted.counter, "unit": counted.unit, "mean": counted.mean,
+        })
+    };
+    if counted.is_empty() { Value::Null } else { counted.iter().map(each).collect() }
 }
 
 /// The host's spans until the first submission of samples ended: name and milliseconds, in order of their beginnings.

@@ -24,6 +24,8 @@ pub struct Report {
     pub kernels: Vec<Series>,
     /// What the driver tells of the compiled kernels, by name; null where it tells nothing.
     pub executables: Value,
+    /// What the hardware counted, mean of a dispatch in the last repeat; null where it counted nothing.
+    pub counters: Value,
     /// Of all buffers.
     pub device_bytes: u64,
     /// Most memory that the process had, where the system tells. On a software driver that is the device's as well.
@@ -76,6 +78,7 @@ impl Report {
             host: vec![],
             kernels: vec![],
             executables: Value::Null,
+            counters: Value::Null,
             device_bytes: 0,
             peak_bytes: None,
         }
@@ -118,6 +121,7 @@ impl Report {
             "host": series(&self.host),
             "kernels": series(&self.kernels),
             "executables": self.executables,
+            "counters": self.counters,
             "megasamplesPerSecond": rate.map(|rate| json!({
                 "median": rate.value, "interval": [rate.low, rate.high], "confidence": rate.confidence,
             })),
@@ -152,6 +156,7 @@ impl Report {
             host: series("host")?,
             kernels: series("kernels")?,
             executables: value["executables"].clone(),
+            counters: value["counters"].clone(),
             device_bytes: value["memory"]["deviceBytes"].as_u64()?,
             peak_bytes: value["memory"]["peakBytes"].as_u64(),
         })

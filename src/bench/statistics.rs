@@ -12,9 +12,9 @@ pub struct Estimate {
 }
 
 /// The median, between two order statistics: the k-th smallest and the k-th largest of n enclose the true median unless
-/// fewer than k values fall on one side of it, which has the probability 2 P(B(n, 1/2) < k) (H. A. David,
-/// H. N. Nagaraja, Order Statistics, 2003, section 7.1). k is the largest that keeps `confidence`; fewer than 6 values do not reach .95,
-/// and then the extremes stand with the confidence that they have. None without values.
+/// fewer than k values fall on one side of it, which has the probability 2 P(B(n, 1/2) < k) (H. A. David, H. N.
+/// Nagaraja, Order Statistics, 2003, section 7.1). k is the largest that keeps `confidence`; fewer than 6 values do not
+/// reach .95, and then the extremes stand with the confidence that they have. None without values.
 pub fn median(values: &[f64], confidence: f64) -> Option<Estimate> {
     let sorted = sorted(values.iter().copied());
     let count = sorted.len();
@@ -34,10 +34,10 @@ pub fn median(values: &[f64], confidence: f64) -> Option<Estimate> {
     Some(Estimate { value, low: sorted[k - 1], high: sorted[count - k], confidence: reached.max(0.0) })
 }
 
-/// By which factor values of `b` exceed those of `a`, both positive: the median of all ratios b/a (J. L. Hodges,
-/// E. L. Lehmann 1963, on logarithms). The interval inverts the test of Mann and Whitney (D. F. Bauer, JASA 67, 687
-/// (1972)): it leaves 1 out exactly when that exact two-sided test tells the two apart at 1 - `confidence`. With equal values it is wider
-/// than it need be. None where there are too few values for such a confidence.
+/// By which factor values of `b` exceed those of `a`, both positive: the median of all ratios b/a (J. L. Hodges, E. L.
+/// Lehmann 1963, on logarithms). The interval inverts the test of Mann and Whitney (D. F. Bauer, JASA 67, 687 (1972)):
+/// it leaves 1 out exactly when that exact two-sided test tells the two apart at 1 - `confidence`. With equal values it
+/// is wider than it need be. None where there are too few values for such a confidence.
 pub fn ratio(a: &[f64], b: &[f64], confidence: f64) -> Option<Estimate> {
     let ratios = sorted(a.iter().flat_map(|a| b.iter().map(move |b| b / a)));
     let value = middle(&ratios)?;

@@ -5,8 +5,8 @@
 pub struct Clock {
     /// Nanoseconds of one tick: `VkPhysicalDeviceLimits::timestampPeriod`.
     pub period: f64,
-    /// Bits that count, 36 to 64: `VkQueueFamilyProperties::timestampValidBits`. The counter wraps beyond them, and what
-    /// stands above them means nothing.
+    /// Bits that count, 36 to 64: `VkQueueFamilyProperties::timestampValidBits`. The counter wraps beyond them, and
+    /// what stands above them means nothing.
     pub bits: u32,
 }
 
@@ -36,8 +36,9 @@ impl Clock {
         anchor.host + self.between(anchor.ticks, ticks)
     }
 
-    /// Where `first` to `last`, all that the device did of what was submitted at `submitted` and seen to be done at `ended`
-    /// (ns), is on the host's clock: where the moment that both know says, within that bracket; without one in its middle.
+    /// Where `first` to `last`, all that the device did of what was submitted at `submitted` and seen to be done at
+    /// `ended` (ns), is on the host's clock: where the moment that both know says, within that bracket; without one in
+    /// its middle.
     pub fn place(self, [first, last]: [u64; 2], [submitted, ended]: [f64; 2], common: Option<Moment>) -> Moment {
         let slack = ended - submitted - self.between(first, last);
         let middle = Moment { ticks: first, host: submitted + slack / 2.0, deviation: slack.abs() / 2.0 };

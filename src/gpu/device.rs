@@ -4,6 +4,7 @@ use super::{
     During,
     buffer::Staging,
     c_name,
+    counters::Counter,
     instance::{Candidate, DeviceInfo, Instance, ValidationLog, describe},
     kernel::Compiled,
     memory::{Allocation, Allocator, MemoryRequest},
@@ -37,10 +38,14 @@ pub struct DeviceOptions {
     pub staging: bool,
     /// Most bytes of one buffer, where that is less than what the device binds.
     pub buffer_bytes: Option<u64>,
-    /// Enables what profiles make use of, where the device has it: VK_EXT_calibrated_timestamps, which puts the device's
-    /// work on the host's clock, and VK_KHR_pipeline_executable_properties ([`Kernel::executables`](super::Kernel::executables)).
-    /// Timestamps themselves need nothing.
+    /// Enables what profiles make use of, where the device has it: VK_EXT_calibrated_timestamps, which puts the
+    /// device's work on the host's clock, and VK_KHR_pipeline_executable_properties
+    /// ([`Kernel::executables`](super::Kernel::executables)). Timestamps themselves need nothing.
     pub profiling: bool,
+    /// Counts what the hardware can count of each dispatch in one pass, where the device has VK_KHR_performance_query;
+    /// the device holds the system's profiling lock as long as it lives. Written by the specification, and untested: no
+    /// device at hand has it.
+    pub counters: bool,
 }
 
 /// A Vulkan device that a caller made and keeps, for [`Device::from_raw`].
@@ -251,6 +256,11 @@ impl Device {
         self.handles.timestamp_bits > 0
     }
 
+    /// What profiled recordings count; nothing without [`DeviceOptions::counters`].
+    pub fn counters(&self) -> &[Counter] {
+        self.handles.profiling.counters.as_ref().map_or(&[], |counters| &counters.list)
+    }
+
     /// Every Vulkan device of this machine, usable or not.
     ///
     /// # Errors
@@ -309,15 +319,16 @@ impl Handles {
         let priorities = [1.0];
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(chosen.family).queue_priorities(&priorities)];
-        let available = if options.profiling { Available::of(&instance, physical) } else { Available::default() };
+        let available = Available::of(&instance, physical, chosen.family, options);
         let mut extensions: Vec<_> = available.names().into_iter().map(CStr::as_ptr).collect();
         if chosen.host_import {
             extensions.push(external_memory_host::NAME.as_ptr());
         }
-        let mut requirements = Requirements::new();
+        let (mut features12, mut features13, mut extra) = Default::default();
+        Requirements::new().enable(&mut features12, &mut features13);
+        features12.host_query_reset = available.counters().into();
         let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
-        let mut executables = Default::default();
-        let create = available.chain(requirements.chain(create), &mut executables);
+        let create = available.chain(create.push_next(&mut features12).push_next(&mut features13), &mut extra);
         // SAFETY: the physical device is of this instance and has the features; all pointers outlive the call.
         let device = unsafe { instance.raw.create_device(physical, &create, None) }.during("create the device")?;
         // SAFETY: the device was made with one queue of this family.
@@ -337,10 +348,10 @@ impl Handles {
             log: instance.log.clone(),
         });
         handles.force_staging = options.staging;
-        handles.profiling = Profiling::new(available, &raw, &handles.device);
         handles.max_buffer_bytes = handles.max_buffer_bytes.min(options.buffer_bytes.unwrap_or(u64::MAX));
         // From here on dropping `handles` destroys the device, before the instance.
         handles.owned = Some(instance);
+        handles.profiling = Profiling::new(available, &raw, &handles.device)?;
         handles.allocator = Some(own_allocator(&raw, physical, &handles.device)?);
         Ok(handles)
     }
@@ -429,6 +440,9 @@ impl Drop for Handles {
     fn drop(&mut self) {
         // The allocator frees its memory through the device, so it goes first.
         drop(self.allocator.take());
+        if let Some(counters) = &self.profiling.counters {
+            counters.release();
+        }
         if self.owned.is_some() {
             // SAFETY: everything made from the device held these handles and is gone.
             unsafe { self.device.destroy_device(None) };

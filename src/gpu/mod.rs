@@ -9,6 +9,7 @@
 mod buffer;
 mod clock;
 mod commands;
+mod counters;
 mod device;
 mod executables;
 mod instance;
@@ -21,6 +22,7 @@ mod requirements;
 pub use buffer::{Buffer, Location, download, download_to, upload};
 pub use clock::{Clock, Moment};
 pub use commands::{Commands, Timestamps};
+pub use counters::Counter;
 pub use device::{Device, DeviceOptions, RawDevice};
 pub use executables::{Executable, Statistic};
 pub use instance::{DeviceInfo, DeviceKind, ValidationLog};

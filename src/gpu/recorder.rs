@@ -5,6 +5,7 @@ use super::{
     buffer::Buffer,
     clock::Clock,
     commands::{Commands, Timestamps},
+    counters::Queries,
     device::{Device, Handles},
     kernel::{Bindings, Kernel},
     profiling::nanoseconds,
@@ -30,6 +31,7 @@ pub struct Recorder {
 struct Profile {
     clock: Clock,
     pools: Vec<vk::QueryPool>,
+    counters: Queries,
     // What was dispatched since `begin`, and why the times of the rest have no place.
     dispatched: Vec<(&'static str, Step)>,
     failure: Option<Error>,
@@ -46,6 +48,8 @@ pub struct Timing {
     pub deviation: f64,
     /// Each dispatch in order; none on a device without timestamps.
     pub scopes: Vec<Scope>,
+    /// What [`Device::counters`] names, for each of the scopes one after the other.
+    pub counters: Vec<f64>,
 }
 
 /// When a dispatch ran: nanoseconds since [`Timing::submitted`].
@@ -56,6 +60,12 @@ pub struct Scope {
     pub step: Step,
     pub begin: f64,
     pub end: f64,
+}
+
+impl Timing {
+    fn new(submitted: Instant, ended: f64) -> Timing {
+        Timing { submitted, ended, deviation: 0.0, scopes: Vec::new(), counters: Vec::new() }
+    }
 }
 
 impl Recorder {
@@ -138,8 +148,18 @@ impl Recorder {
         }
         self.hold(&kernel.objects);
         self.hold(&bindings.objects);
-        let times = self.profile.as_mut().and_then(|profile| profile.next(&self.commands, kernel, step));
+        let queries = self.profile.as_mut().and_then(|profile| profile.next(&self.commands, kernel, step));
+        let (times, counters) = queries.map_or((None, None), |(times, counters)| (Some(times), counters));
+        let (device, raw) = (&self.commands.handles.device, self.commands.raw);
+        if let Some((pool, query)) = counters {
+            // SAFETY: the recording is open; the profiling lock is held since before it began, and the query was reset.
+            unsafe { device.cmd_begin_query(raw, pool, query, vk::QueryControlFlags::empty()) };
+        }
         self.commands.dispatch(kernel, bindings, invocations, step, times);
+        if let Some((pool, query)) = counters {
+            // SAFETY: the query was begun just above.
+            unsafe { device.cmd_end_query(raw, pool, query) };
+        }
     }
 
     /// Sets every whole word of `buffer` to `word`.
@@ -187,7 +207,12 @@ impl Recorder {
         let device = &handles.device;
         self.commands.host_barrier();
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands.raw)];
-        let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
+        let mut pass = vk::PerformanceQuerySubmitInfoKHR::default();
+        let mut submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
+        if self.profile.is_some() && handles.profiling.counters.is_some() {
+            submit = submit.push_next(&mut pass);
+        }
+        let submit = [submit];
         let submitted = Instant::now();
         // SAFETY: the recording is open and complete, what it uses is held; the queue is ours while locked.
         unsafe {
@@ -207,8 +232,8 @@ impl Recorder {
     /// When the last recording ran, and each of its dispatches; none without [`Recorder::profiled`].
     ///
     /// On a device that was opened with [`DeviceOptions::profiling`](super::DeviceOptions::profiling) and has
-    /// VK_EXT_calibrated_timestamps, dispatches are where the device's clock says; elsewhere in the middle of where they
-    /// can be between submission and end.
+    /// VK_EXT_calibrated_timestamps, dispatches are where the device's clock says; elsewhere in the middle of where
+    /// they can be between submission and end.
     pub fn timing(&self) -> Option<&Timing> {
         self.profile.as_ref().map(|profile| &profile.timing)
     }
@@ -234,6 +259,7 @@ impl Drop for Recorder {
             for pool in self.profile.iter().flat_map(|profile| &profile.pools) {
                 device.destroy_query_pool(*pool, None);
             }
+            self.profile.iter().for_each(|profile| profile.counters.destroy(device));
             device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
         }
@@ -246,41 +272,56 @@ impl Profile {
         Profile {
             clock: Clock { period, bits: handles.timestamp_bits },
             pools: Vec::new(),
+            counters: Queries::default(),
             dispatched: Vec::new(),
             failure: None,
-            timing: Timing { submitted: Instant::now(), ended: 0.0, deviation: 0.0, scopes: Vec::new() },
+            timing: Timing::new(Instant::now(), 0.0),
         }
     }
 
-    /// Where the times of the next dispatch go. That there is no place is told when the recording is submitted.
-    fn next(&mut self, commands: &Commands, kernel: &Kernel, step: &Step) -> Option<Timestamps> {
+    /// Where the times of the next dispatch go, and what is counted of it. That there is no place is told when the
+    /// recording is submitted.
+    fn next(
+        &mut self,
+        commands: &Commands,
+        kernel: &Kernel,
+        step: &Step,
+    ) -> Option<(Timestamps, Option<(vk::QueryPool, u32)>)> {
         if self.clock.bits == 0 || self.failure.is_some() {
             return None;
         }
+        match self.places(commands) {
+            Ok(places) => {
+                self.dispatched.push((kernel.objects.stem, *step));
+                Some(places)
+            }
+            Err(error) => {
+                self.failure = Some(error);
+                None
+            }
+        }
+    }
+
+    fn places(&mut self, commands: &Commands) -> Result<(Timestamps, Option<(vk::QueryPool, u32)>)> {
+        let counters = self.counters.query(&commands.handles, self.dispatched.len())?;
         let (index, first) = (self.dispatched.len() / TIMED as usize, self.dispatched.len() as u32 % TIMED);
         if index == self.pools.len() {
             let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * TIMED);
             // SAFETY: the device is alive; dropping the recorder destroys the pool.
-            match unsafe { commands.handles.device.create_query_pool(&create, None) }.during("create the timestamps") {
-                Ok(pool) => self.pools.push(pool),
-                Err(error) => {
-                    self.failure = Some(error);
-                    return None;
-                }
-            }
+            let pool = unsafe { commands.handles.device.create_query_pool(&create, None) };
+            self.pools.push(pool.during("create the timestamps")?);
         }
         let pool = self.pools[index];
         if first == 0 {
             commands.reset_queries(Timestamps { pool, first: 0 }, 2 * TIMED);
         }
-        self.dispatched.push((kernel.objects.stem, *step));
-        Some(Timestamps { pool, first: 2 * first })
+        Ok((Timestamps { pool, first: 2 * first }, counters))
     }
 
     /// Fetches the times of a recording that has just ended.
     fn read(&mut self, handles: &Handles, submitted: Instant) -> Result<()> {
         let ended = nanoseconds(submitted);
-        self.timing = Timing { submitted, ended, deviation: 0.0, scopes: Vec::with_capacity(self.dispatched.len()) };
+        self.timing = Timing::new(submitted, ended);
         let mut ticks = vec![0u64; 2 * self.dispatched.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         for (pool, ticks) in self.pools.iter().zip(ticks.chunks_mut(2 * TIMED as usize)) {
@@ -296,6 +337,7 @@ impl Profile {
             let [begin, end] = [pair[0], pair[1]].map(|ticks| clock.host(anchor, ticks));
             Scope { kernel, step, begin, end }
         }));
+        self.timing.counters = self.counters.read(handles, self.dispatched.len())?;
         Ok(())
     }
 }

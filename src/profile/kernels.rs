@@ -1,6 +1,7 @@
 //! The device's spans, summed up for each kernel.
 
 use super::{Span, Track};
+use std::collections::BTreeMap;
 
 /// What a kernel took: nanoseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,4 +45,36 @@ pub(super) fn sums(spans: &[Span]) -> Vec<KernelTimes> {
     // A clock too coarse to see any of them leaves no shares.
     sums.iter_mut().for_each(|sum| sum.share = if all > 0.0 { sum.total / all } else { 0.0 });
     sums
+}
+
+/// Something that a device counted while it ran a kernel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Counted {
+    pub kernel: &'static str,
+    pub counter: String,
+    /// Empty for a mere number.
+    pub unit: &'static str,
+    /// Of a dispatch.
+    pub mean: f64,
+}
+
+/// Counters by kernel and name: unit, dispatches, sum.
+#[derive(Default)]
+pub(super) struct Sums(BTreeMap<(&'static str, String), (&'static str, u64, f64)>);
+
+impl Sums {
+    pub fn add<'a>(&mut self, kernel: &'static str, counters: impl Iterator<Item = (&'a str, &'static str, f64)>) {
+        for (name, unit, value) in counters {
+            let (_, count, sum) = self.0.entry((kernel, name.to_string())).or_insert((unit, 0, 0.0));
+            *count += 1;
+            *sum += value;
+        }
+    }
+
+    pub fn means(&self) -> Vec<Counted> {
+        let mean = |((kernel, counter), (unit, count, sum)): (&(&'static str, String), &(&'static str, u64, f64))| {
+            Counted { kernel, counter: counter.clone(), unit, mean: sum / *count as f64 }
+        };
+        self.0.iter().map(mean).collect()
+    }
 }

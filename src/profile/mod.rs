@@ -1,5 +1,5 @@
-//! What takes how long: spans of the host's and the device's work on one clock, summed up for each kernel, and as a trace
-//! that Perfetto and `chrome://tracing` open.
+//! What takes how long: spans of the host's and the device's work on one clock, summed up for each kernel, and as a
+//! trace that Perfetto and `chrome://tracing` open.
 //!
 //! ```
 //! # fn main() -> translucent::Result<()> {
@@ -28,9 +28,9 @@
 //! Without a timeline nothing is timed: no query pool is made and no timestamp written. With one, each dispatch writes
 //! two timestamps. Dispatches follow one another anyway, each after a barrier, so they are not held up by them.
 //!
-//! With the cargo feature `tracy` every timeline is also sent to the profiler Tracy while it grows: the host's spans as zones of
-//! their thread, dispatches as those of a device on the host's clock. [`Timeline::new`] starts its client, which waits for
-//! a viewer of Tracy's on a port of its own.
+//! With the cargo feature `tracy` every timeline is also sent to the profiler Tracy while it grows: the host's spans as
+//! zones of their thread, dispatches as those of a device on the host's clock. [`Timeline::new`] starts its client,
+//! which waits for a viewer of Tracy's on a port of its own.
 //!
 //! On a software driver a kernel's time is wall time of the processor's cores, and means something while they are idle.
 
@@ -39,7 +39,7 @@ mod trace;
 #[cfg(feature = "tracy")]
 mod tracy;
 
-pub use kernels::KernelTimes;
+pub use kernels::{Counted, KernelTimes};
 
 use std::{
     fmt,
@@ -94,6 +94,7 @@ pub struct Timeline {
 struct Noted {
     spans: Vec<Span>,
     deviation: f64,
+    counted: kernels::Sums,
 }
 
 impl Timeline {
@@ -136,6 +137,12 @@ impl Timeline {
         kernels::sums(&self.noted().spans)
     }
 
+    /// What the device counted, on average over a kernel's dispatches; nothing without
+    /// [`DeviceOptions::counters`](crate::DeviceOptions::counters).
+    pub fn counters(&self) -> Vec<Counted> {
+        self.noted().counted.means()
+    }
+
     /// The trace in Chrome's JSON format, in microseconds, with `about` as its `otherData`.
     pub fn trace(&self, about: &serde_json::Value) -> String {
         let noted = self.noted();
@@ -159,6 +166,11 @@ impl Timeline {
         let spans = spans.into_iter().inspect(|span| self.tracy.note(span));
         noted.spans.extend(spans);
         noted.deviation = noted.deviation.max(deviation);
+    }
+
+    /// Notes what was counted of a dispatch: name and unit of each counter, and its value.
+    pub(crate) fn count<'a>(&self, kernel: &'static str, counters: impl Iterator<Item = (&'a str, &'static str, f64)>) {
+        self.noted().counted.add(kernel, counters);
     }
 
     fn noted(&self) -> MutexGuard<'_, Noted> {

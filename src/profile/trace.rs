@@ -1,5 +1,5 @@
-//! Chrome's trace format: "Trace Event Format", N. Duca, D. Sinclair, 2016; complete events (X), metadata (M) and counters
-//! (C), times in microseconds.
+//! Chrome's trace format: "Trace Event Format", N. Duca, D. Sinclair, 2016; complete events (X), metadata (M) and
+//! counters (C), times in microseconds.
 
 use super::{Span, Track};
 use serde_json::{Value, json};

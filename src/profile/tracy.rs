@@ -1,5 +1,5 @@
-//! Spans as Tracy shows them. Its protocol takes the host's zones only while they go on, so submissions, which are noted when they
-//! have ended, show as their dispatches alone.
+//! Spans as Tracy shows them. Its protocol takes the host's zones only while they go on, so submissions, which are
+//! noted when they have ended, show as their dispatches alone.
 
 use super::{Span, Track};
 use tracy_client::{Client, GpuContext, GpuContextType};

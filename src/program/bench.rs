@@ -38,6 +38,10 @@ pub struct Bench {
     /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
     #[arg(long, value_name = "INDEX|NAME|UUID")]
     device: Option<String>,
+    /// Count what the hardware can count of each kernel (VK_KHR_performance_query), for the JSON. Counting slows
+    /// kernels down.
+    #[arg(long)]
+    counters: bool,
     /// Everything that was measured, as JSON.
     #[arg(short, long, value_name = "OUT.json")]
     output: Option<PathBuf>,
@@ -47,13 +51,14 @@ pub struct Bench {
     /// Say in which kernels two runs of the same work differ beyond noise. Exit status 0: in none; 1: in some; 2: they
     /// cannot be compared.
     #[arg(long, value_names = ["A.json", "B.json"], num_args = 2,
-          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "output"])]
+          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "counters", "output"])]
     compare: Option<Vec<PathBuf>>,
     /// How sure it is that runs that do not differ are said not to, in per cent.
     #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "99", value_parser = percentage)]
     confidence: f64,
     /// Least difference of times that counts, in per cent.
-    #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "0", value_parser = arguments::not_negative)]
+    #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "0",
+          value_parser = arguments::not_negative)]
     least: f64,
 }
 
@@ -86,8 +91,12 @@ impl Bench {
         }
         let timeline = Some(timeline);
         let opening = begin(&timeline, "device");
-        let with = DeviceOptions { device: self.device.clone(), profiling: true, ..DeviceOptions::default() };
+        let counters = self.counters;
+        let with = DeviceOptions { device: self.device.clone(), profiling: true, counters, ..DeviceOptions::default() };
         let device = Device::open(&with)?;
+        if counters && !self.quiet && device.counters().is_empty() {
+            eprintln!("warning: the device counts nothing: it lacks VK_KHR_performance_query, or counters of kernels");
+        }
         drop(opening);
         let settings = Settings { seed: self.seed, timeline, ..options.settings() };
         let effort = Effort { samples: self.samples, warmup: self.warmup, repeat: self.repeat };

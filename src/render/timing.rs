@@ -54,5 +54,10 @@ impl Renderer {
             }
         });
         timeline.note(once(host).chain(device), timing.deviation);
+        let counters = self.device.counters();
+        for (scope, values) in timing.scopes.iter().zip(timing.counters.chunks_exact(counters.len().max(1))) {
+            let named = counters.iter().zip(values).map(|(counter, value)| (&*counter.name, counter.unit, *value));
+            timeline.count(scope.kernel, named);
+        }
     }
 }

@@ -43,6 +43,7 @@ fn synthetic(random: &mut Random, repeat: usize, factor: impl Fn(&str) -> f64) -
         host: vec![series("render", random.times(repeat, 50.0))],
         kernels,
         executables: Value::Null,
+        counters: Value::Null,
         device_bytes: 1 << 20,
         peak_bytes: None,
     }
@@ -193,7 +194,7 @@ fn the_program_compares_files_and_refuses_other_work() {
 fn the_program_measures_what_it_says() {
     let folder = Folder::new("bench");
     let bench = "bench SPOT --model standard --resolution 12x10 --environment constant:1,1,1 --quiet";
-    let said = folder.done(&format!("{bench} --samples 3 --repeat 2 --warmup 1 -o a.json"));
+    let said = folder.done(&format!("{bench} --samples 3 --repeat 2 --warmup 1 --counters -o a.json"));
     assert!(said.contains("2 repeats after 1; intervals of the median at 50.0 %"), "{said}");
     let report = Report::read(folder.join("a.json")).expect("a report");
     assert_eq!(report.effort, Effort { samples: 3, warmup: 1, repeat: 2 });
@@ -205,6 +206,9 @@ fn the_program_measures_what_it_says() {
     for part in ["load", "bvh", "device", "prepare", "pipelines", "upload", "first dispatch"] {
         assert!(parts.contains(&part), "{part} of {parts:?}");
     }
+    // Where there is nothing to count or tell, nothing is made up.
+    assert!(report.counters.is_null() || report.counters.is_array());
+    assert!(report.executables.is_null() || report.executables.is_object());
     assert!(report.device_bytes > 0 && report.rate().is_some_and(|rate| rate.value > 0.0));
     if cfg!(target_os = "linux") {
         // At least what the buffers of a software driver take.

@@ -122,7 +122,8 @@ fn the_trace_opens_is_nested_and_names_what_ran() {
 #[test]
 fn a_render_of_more_dispatches_than_one_query_pool_holds_is_timed_whole() {
     let folder = Folder::new("many");
-    // 32 samples go in one submission, each with 50 portions of rays for two kernels: 3,200 dispatches, and a pool has 1,024.
+    // 32 samples go in one submission, each with 50 portions of rays for two kernels: 3,200 dispatches, and a pool has
+    // 1,024.
     folder.done(
         "render SPOT --resolution 1x1 --samples 33 --directions 200 --environment constant:1,1,1 --profile a.csv",
     );
