@@ -30,7 +30,8 @@ vec2 hit_barycentric;
 
 // From a triangle's first vertex to a point of it.
 vec3 from_corner(Triangle t, vec2 barycentric) {
-    return barycentric.x * (t.vertices[1] - t.vertices[0]) + barycentric.y * (t.vertices[2] - t.vertices[0]);
+    precise vec3 to = barycentric.x * (t.vertices[1] - t.vertices[0]) + barycentric.y * (t.vertices[2] - t.vertices[0]);
+    return to;
 }
 
 // Turns the axis along which a ray runs most to z.

@@ -35,7 +35,8 @@ void main() {
     surface.barycentric = vec2(0.0);
     if (hit_count != 0) {
         Triangle triangle = triangles[hit_triangle[0]];
-        surface.position = triangle.vertices[0] + from_corner(triangle, hit_barycentric);
+        precise vec3 position = triangle.vertices[0] + from_corner(triangle, hit_barycentric);
+        surface.position = position;
         surface.triangle = hit_triangle[0];
         surface.barycentric = hit_barycentric;
     }

@@ -80,7 +80,7 @@
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
 //! | [`bench`] | all of these | fixed work, timed again and again, and compared |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
-//! | [`verify`] | all of these | single kernels on a device beside their twins |
+//! | [`verify`] | all of these | tests of a driver: functions and kernels beside their twins |
 //!
 //! Unsafe code is denied outside of `gpu`, but for [`Renderer::record`], whose command buffer is the caller's. The C
 //! interface is a package of its own, `src/capi`, which sees this public interface alone; its header is made of it.

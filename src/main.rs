@@ -3,7 +3,7 @@
 mod program;
 
 use clap::{Parser, Subcommand};
-use program::{bench::Bench, inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables};
+use program::{bench::Bench, inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables, verify::Verify};
 use std::process::ExitCode;
 
 /// Renders translucent matter (marble, skin, milk, wax) in glTF scenes with Vulkan compute.
@@ -30,6 +30,8 @@ enum Command {
     Bench(Box<Bench>),
     /// Put the parts of a larger render together, weighted by samples.
     Merge(Merge),
+    /// Test a driver: every kernel and function against its twin.
+    Verify(Box<Verify>),
     /// List every named material with its coefficients, mean free path and colour.
     Presets,
     /// List every Vulkan device with what it lacks.
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
         Command::Measure(measure) => measure.run(),
         Command::Bench(bench) => bench.run(),
         Command::Merge(merge) => merge.run(),
+        Command::Verify(verify) => verify.run(),
         Command::Presets => tables::presets(),
         Command::Devices => tables::devices(),
     };

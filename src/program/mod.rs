@@ -11,6 +11,7 @@ pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod tables;
+pub mod verify;
 
 use std::{
     fmt::Display,

@@ -17,13 +17,18 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! `translucent verify` runs them in googletest's words ([`protocol`]), so that deqp-runner's `gtest-runner` drives it:
+//! `gtest-runner run --gtest translucent --output results --baseline fails.txt -- verify`.
 
 mod bench;
 pub mod cases;
+mod expectations;
 pub mod functions;
 pub mod geometry;
 pub mod image;
 pub mod profiles;
+pub mod protocol;
 pub mod stages;
 pub mod surfaces;
 mod verdict;
@@ -31,6 +36,7 @@ mod world;
 
 pub use bench::{Bench, Dispatch, FUNCTIONS, Loaded};
 pub use cases::Case;
+pub use expectations::Expectations;
 pub use verdict::{Bound, Census, ROUNDING, Roundings, Verdict, Worst, roundings, ulp};
 pub use world::World;
 
@@ -184,4 +190,15 @@ pub fn spirv_hash() -> String {
         hash.update(spirv);
     }
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Which compiler made the SPIR-V: number and version of the tool, as the Khronos registry of generators lists them.
+pub fn compiler() -> String {
+    let word = FUNCTIONS.get(8..12).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
+    let tool = match word >> 16 {
+        8 => "glslang",
+        13 => "shaderc over glslang",
+        _ => "generator",
+    };
+    format!("{tool} ({}.{})", word >> 16, word & 0xffff)
 }

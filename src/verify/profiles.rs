@@ -21,7 +21,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Media of a test.
-const MEDIA: u32 = 64;
+const MEDIA: u32 = 16;
 
 const OPTIONS: Options = Options {
     normalisation: Normalisation::Energy,

@@ -110,6 +110,7 @@ pub fn primary(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     let mut verdict = context.exact(roundings(48, 3, 2))?;
     // Hits at one distance, from either of which the position may come.
     verdict.exempt = if verdict.bound == Bound::Exact { 0.0 } else { CHOICES };
+    let mut same = 0;
     for staged in staged {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());
         let blank = vec![Surface::default(); staged.surfaces.len() * BATCHES as usize];
@@ -125,6 +126,7 @@ pub fn primary(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
             // A sum of three products of which drivers make other sums.
             let distance = (found.position - expected.position).abs().max_element();
             verdict.require(distance <= 4e-7, || format!("{}: position {distance:e} off", at()));
+            same += usize::from(distance == 0.0);
             for c in 0..2 {
                 verdict.bits(found.barycentric[c], expected.barycentric[c], 64.0, || format!("{}, weight {c}", at()));
             }
@@ -139,6 +141,7 @@ pub fn primary(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         let written = elsewhere.filter(|(_, surface)| **surface != Surface::default()).count();
         verdict.require(written == 0, || format!("{name}: {written} surfaces of other batches are written"));
     }
+    verdict.notes.push(format!("{same} positions bit for bit"));
     Ok(verdict)
 }
 

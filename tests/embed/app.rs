@@ -38,6 +38,18 @@ impl App {
         App::with(vk::API_VERSION_1_3, wrap, false)
     }
 
+    /// As [`App::wrapped`], for functions that may stand before validation.
+    #[allow(dead_code)]
+    pub fn validated(wrap: Wrap) -> App {
+        App::with(vk::API_VERSION_1_3, wrap, true)
+    }
+
+    /// What validation has said since this was asked last.
+    #[allow(dead_code)]
+    pub fn take_messages(&self) -> Vec<String> {
+        std::mem::take(&mut *self.messages.lock().expect("no panic"))
+    }
+
     /// With an instance made for that version of Vulkan.
     pub fn of_version(version: u32) -> App {
         App::with(version, |_, function| function, true)

@@ -7,6 +7,7 @@
 mod common;
 mod math;
 mod models;
+mod mutants;
 mod overflow;
 mod recording;
 #[allow(dead_code)]

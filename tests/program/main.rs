@@ -13,6 +13,7 @@ mod profile;
 mod scenes;
 mod textures;
 mod usage;
+mod verify;
 
 use std::{
     fs,
