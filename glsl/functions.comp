@@ -59,7 +59,7 @@ void main() {
     }
 
     if (f == FUNCTION_FRESNEL) y.x = fresnel(x.x, x.y);
-    if (f == FUNCTION_CROSSING) y.x = crossing(materials[k], x.x);
+    if (f == FUNCTION_CROSSING) y.xy = vec2(crossing(materials[k], x.x, x.y), leaving_share(materials[k], x.y));
     if (f == FUNCTION_GGX) y.xy = vec2(ggx_distribution(x.x, a), ggx_lambda(x.x, a));
     if (f == FUNCTION_HALF_VECTOR) y = draw_half_vector(a, x.x, x.yz);
     if (f == FUNCTION_REFRACTED) y = refracted(a, b, x.x);

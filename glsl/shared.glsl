@@ -175,7 +175,7 @@ const uint FUNCTION_ATAN2 = 12u;
 const uint FUNCTION_BASIS = 13u;
 // Of `functions`: `fresnel`.
 const uint FUNCTION_FRESNEL = 14u;
-// Of `functions`: `crossing`.
+// Of `functions`: `crossing` and `leaving_share`.
 const uint FUNCTION_CROSSING = 15u;
 // Of `functions`: `ggx_distribution` and `ggx_lambda`.
 const uint FUNCTION_GGX = 16u;

@@ -348,7 +348,7 @@ constants! {
     FUNCTION_BASIS: u32 = 13;
     /// Of `functions`: `fresnel`.
     FUNCTION_FRESNEL: u32 = 14;
-    /// Of `functions`: `crossing`.
+    /// Of `functions`: `crossing` and `leaving_share`.
     FUNCTION_CROSSING: u32 = 15;
     /// Of `functions`: `ggx_distribution` and `ggx_lambda`.
     FUNCTION_GGX: u32 = 16;

@@ -7,10 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    reference::{
-        Inputs, boundary, emitter, light, math, rough::Boundaries, rough::crossing as twin_crossing, single,
-        texture as twin,
-    },
+    reference::{Inputs, boundary, emitter, light, math, rough, single, texture as twin},
     shared::*,
 };
 use glam::{DVec2, DVec3, Vec3, dvec3};
@@ -109,16 +106,32 @@ pub fn fresnel(context: &mut Context) -> Result<Verdict> {
     scalars(context, FUNCTION_FRESNEL, roundings(16, 2, 1), &World::default(), &x, twin, (2, 0))
 }
 
-/// Transmittance of a rough boundary, from its table.
+/// Transmittance of rough boundaries, and what radiance that leaves is multiplied by, from their tables: here any numbers.
 pub fn crossing(context: &mut Context) -> Result<Verdict> {
-    let mut boundaries = Boundaries::default();
-    let (table, _) = boundaries.add(0.25, 1.4);
-    let material = Material { ior: 1.4, boundary: table, ..Material::default() };
-    let features = Features { rough: 1, ..Features::default() };
-    let world = World { features, materials: vec![material], boundaries: boundaries.nodes, ..World::default() };
-    let x: Vec<Vec3> = (0..context.share(INPUTS)).map(|i| Vec3::new(number(i, 1) as f32, 0.0, 0.0)).collect();
-    let twin = |inputs: &Inputs, x: &[f64]| twin_crossing(inputs, &inputs.materials[0], x[0].min(1.0));
-    scalars(context, FUNCTION_CROSSING, roundings(4, 0, 1), &world, &x, twin, (1, 0))
+    let boundaries = (0..2 * ROUGHNESS_ROWS * BOUNDARY_ROW).map(|i| 0.5 + 0.5 * number(i, 9) as f32).collect();
+    let materials = [1, 2].map(|boundary| Material { ior: 1.4, boundary, ..Material::default() }).to_vec();
+    let count = context.share(INPUTS);
+    let x: Vec<Vec3> = (0..count).map(|i| Vec3::new(number(i, 1) as f32, number(i, 2) as f32, 0.0)).collect();
+    let shadings = (0..count).map(|i| Shading { material: i % 2, ..Shading::default() }).collect();
+    let features = Features { rough: ROUGHNESS_ROWS, ..Features::default() };
+    let world = World { features, materials, shadings, boundaries, ..World::default() };
+    let inputs = world.inputs();
+    let found = context.bench.evaluate(FUNCTION_CROSSING, &inputs, &[], &x, &[])?;
+    let bound = roundings(12, 1, 1);
+    let mut verdict = Verdict::new(Bound::Relative(bound));
+    for (i, (x, found)) in x.iter().zip(&found).enumerate() {
+        let material = &inputs.materials[i % 2];
+        let arguments = [f64::from(x.x), f64::from(x.y)];
+        let parts: [(f32, &dyn Fn(&[f64]) -> f64); 2] = [
+            (found.x, &|x| rough::crossing(&inputs, material, x[0].min(1.0), x[1].min(1.0))),
+            (found.y, &|x| rough::leaving_share(&inputs, material, x[1].min(1.0))),
+        ];
+        for (part, (found, twin)) in parts.into_iter().enumerate() {
+            let scale = conditioned(bound, &arguments, twin);
+            verdict.compare(found, twin(&arguments), scale, || format!("part {part} at {}, {}", x.x, x.y));
+        }
+    }
+    Ok(verdict)
 }
 
 /// GGX distribution and Smith's Lambda.
