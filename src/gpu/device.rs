@@ -5,7 +5,8 @@ use super::{
     buffer::Staging,
     c_name,
     counters::Counter,
-    instance::{Candidate, DeviceInfo, Instance, ValidationLog, describe},
+    host::{self, Left},
+    instance::{Candidate, DeviceInfo, DeviceKind, Instance, ValidationLog, describe},
     kernel::Compiled,
     memory::{Allocation, Allocator, MemoryRequest},
     profiling::{Available, Profiling},
@@ -194,6 +195,9 @@ impl Device {
         let instance = Instance::new(options.validation)?;
         let candidates = instance.candidates()?;
         let chosen = choose(&candidates, options.device.as_deref())?;
+        if chosen.info.kind == DeviceKind::Cpu {
+            host::check_driver()?;
+        }
         let handles = Handles::create(instance, chosen, options)?;
         Ok(Device { handles: Arc::new(handles), staging: Arc::default(), kernels: Arc::default() })
     }
@@ -294,6 +298,18 @@ impl Device {
         // SAFETY: the physical device is of this instance and has the extension; the structures outlive the call.
         unsafe { instance.get_physical_device_memory_properties2(*physical, &mut properties) };
         budget.heap_budget[*index].saturating_sub(budget.heap_usage[*index]).min(*bytes)
+    }
+
+    /// Whether its buffers are in the host's memory: it is the processor.
+    pub fn shares_host_memory(&self) -> bool {
+        self.info().kind == DeviceKind::Cpu
+    }
+
+    /// Bytes that this process may still take of the host's memory, and what sets that limit, in words; beside what the
+    /// driver takes where the device is the processor.
+    pub fn host_left(&self) -> (u64, &'static str) {
+        let Left { bytes, limit } = host::left(self.shares_host_memory());
+        (bytes, limit)
     }
 
     /// Of which number (bytes) address and size of memory for [`Buffer::import_host`](super::Buffer::import_host) must

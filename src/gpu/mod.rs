@@ -12,6 +12,7 @@ mod commands;
 mod counters;
 mod device;
 mod executables;
+mod host;
 mod instance;
 mod kernel;
 mod memory;

@@ -5,6 +5,7 @@ pub mod bench;
 pub mod inspect;
 pub mod log;
 pub mod measure;
+mod memory;
 pub mod merge;
 pub mod plot;
 pub mod profile;

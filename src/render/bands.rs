@@ -81,9 +81,10 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let limit = limits.buffer_bytes / widest;
     let width = prepared.view.crop_width;
     // Half of the memory is left to the scene and to others. Whether it suffices at all is asked later.
+    let memory = limits.heap_bytes.min(if limits.shared { limits.host_bytes } else { u64::MAX });
     let wanted = match settings.recording {
         true => u64::MAX,
-        false => u64::from(settings.band_pixels.unwrap_or(BAND_PIXELS)).min(limits.heap_bytes / 2 / whole),
+        false => u64::from(settings.band_pixels.unwrap_or(BAND_PIXELS)).min(memory / 2 / whole),
     };
     if u64::from(width) > limit {
         return Err(Error::Memory {

@@ -36,7 +36,7 @@ pub fn check(limits: Limits, scene: &Scene, prepared: &Prepared, bands: &[Band])
     let largest = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
     let of_slot = |(slot, bytes): (Slot, u64)| Need { what: slot.name().into(), bytes, remedy: remedy(slot) };
     let device: Vec<Need> = plan::sizes(scene, prepared, largest).into_iter().map(of_slot).collect();
-    refuse(&device, limits.heap_bytes, "the device's memory")?;
+    refuse(&device, limits.heap_bytes, "the device's memory", "")?;
 
     let pixels: u64 = bands.iter().map(|band| u64::from(band.pixels)).sum();
     let image = pixels * assemble::bytes_per_pixel(prepared.features.batches != 0);
@@ -47,10 +47,11 @@ pub fn check(limits: Limits, scene: &Scene, prepared: &Prepared, bands: &[Band])
     if limits.shared {
         host.extend(device);
     }
-    refuse(&host, limits.host_bytes, limits.host_limit)
+    let beside = if limits.shared { ", beside what the driver takes" } else { "" };
+    refuse(&host, limits.host_bytes, &format!("{}{beside}", limits.host_limit), ", or raise that limit")
 }
 
-fn refuse(needs: &[Need], left: u64, limit: &str) -> Result<()> {
+fn refuse(needs: &[Need], left: u64, limit: &str, otherwise: &str) -> Result<()> {
     let sum: u64 = needs.iter().map(|need| need.bytes).sum();
     if sum <= left {
         return Ok(());
@@ -61,7 +62,7 @@ fn refuse(needs: &[Need], left: u64, limit: &str) -> Result<()> {
     let list: Vec<String> =
         needs.iter().take(4).map(|need| format!("{} {}", need.what, megabytes(need.bytes))).collect();
     let problem = format!(
-        "{} are needed ({}{}), {} are left by {limit}; {}",
+        "{} are needed ({}{}), {} are left by {limit}; {}{otherwise}",
         megabytes(sum),
         list.join(", "),
         if needs.len() > 4 { ", ..." } else { "" },

@@ -3,7 +3,6 @@
 mod assemble;
 mod bands;
 mod budget;
-mod host;
 mod plan;
 mod record;
 mod sums;

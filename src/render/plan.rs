@@ -1,9 +1,9 @@
 //! What a scene and its settings require of a device, and why. [`Renderer`](super::Renderer) makes exactly this.
 
-use super::{bands, budget, host};
+use super::{bands, budget};
 use crate::{
     error::Result,
-    gpu::{Device, DeviceKind},
+    gpu::Device,
     prepare::{Prepared, prepare},
     scene::Scene,
     settings::Settings,
@@ -37,10 +37,10 @@ impl Limits {
 
     /// Those of a device, and of this process, as they are now.
     pub fn of(device: &Device) -> Limits {
-        let (host_bytes, host_limit) = host::left();
-        let shared = device.info().kind == DeviceKind::Cpu;
-        let heap_bytes = device.heap_left().min(if shared { host_bytes } else { u64::MAX });
-        Limits { buffer_bytes: device.max_storage_buffer_range(), heap_bytes, host_bytes, host_limit, shared }
+        let (host_bytes, host_limit) = device.host_left();
+        let shared = device.shares_host_memory();
+        let (buffer_bytes, heap_bytes) = (device.max_storage_buffer_range(), device.heap_left());
+        Limits { buffer_bytes, heap_bytes, host_bytes, host_limit, shared }
     }
 }
 

@@ -93,6 +93,9 @@ fn a_buffer_beyond_the_device_is_a_memory_error_that_names_it() {
             other => panic!("expected a memory error, got {other:?}"),
         }
         assert!(device.heap_size() >= device.max_storage_buffer_range());
+        assert!((1..=device.heap_size()).contains(&device.heap_left()));
+        let (left, limit) = device.host_left();
+        assert!(left > 0 && !limit.is_empty());
     });
 }
 

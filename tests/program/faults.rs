@@ -108,3 +108,32 @@ fn a_disk_without_room_leaves_the_old_file() {
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("/proc/out.exr"), "{}", stderr(&output));
 }
+
+#[test]
+fn memory_that_is_not_there_is_refused_before_the_work() {
+    let folder = Folder::new("memory");
+    let render = |kib: u32, size: &str| {
+        let words = format!("render SPOT --resolution {size} --samples 1 --quiet -o out.exr");
+        let output = limited(&folder, &format!("ulimit -v {kib}"), &words);
+        (output.status.code(), stderr(&output))
+    };
+    // From less than the program itself takes to more than the render does: refused in words, until it works.
+    let mut works = 0;
+    for kib in (100_000..2_000_000).step_by(150_000) {
+        let (code, said) = render(kib, "16x16");
+        match code {
+            Some(0) => works += 1,
+            // The system's own loader refuses programs that do not fit.
+            Some(127) => assert!(said.contains("cannot") && works == 0, "{kib}: {said}"),
+            _ => assert!(code == Some(1) && said.contains("error: ") && works == 0, "{kib}: {code:?} {said}"),
+        }
+    }
+    assert!(works >= 3, "{works} of them");
+    // What is needed for what, what is left, and what makes it less.
+    let (code, said) = render(2_000_000, "8192x8192");
+    assert_eq!(code, Some(1), "{said}");
+    for part in ["are needed (image 5100.3 MB", "are left by", "ulimit -v", "lower the resolution or crop"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert_eq!(folder.files(), ["out.exr"]);
+}
