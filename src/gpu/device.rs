@@ -8,11 +8,11 @@ use super::{
     host::{self, Left},
     instance::{Candidate, DeviceInfo, DeviceKind, Instance, ValidationLog, describe},
     kernel::Compiled,
-    memory::{Allocation, Allocator, MemoryRequest},
+    memory::{Allocation, Allocator, Heap, MemoryRequest},
     profiling::{Available, Profiling},
     requirements::{self, Requirements},
 };
-use crate::{Error, Result, shared::Slot};
+use crate::{Error, Result};
 use ash::{
     ext::{debug_utils, external_memory_host},
     vk,
@@ -154,14 +154,6 @@ pub(super) struct Handles {
     log: ValidationLog,
 }
 
-/// The memory heap that device buffers come from.
-struct Heap {
-    index: usize,
-    bytes: u64,
-    /// To be asked how much of it is left; none without VK_EXT_memory_budget.
-    budget: Option<(ash::Instance, vk::PhysicalDevice)>,
-}
-
 /// VK_EXT_external_memory_host.
 pub(super) struct HostMemory {
     pub functions: external_memory_host::Device,
@@ -291,13 +283,7 @@ impl Device {
 
     /// Bytes of that heap that this process may still take: what VK_EXT_memory_budget says, else the whole heap.
     pub fn heap_left(&self) -> u64 {
-        let Heap { index, bytes, budget } = &self.handles.heap;
-        let Some((instance, physical)) = budget else { return *bytes };
-        let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
-        let mut properties = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
-        // SAFETY: the physical device is of this instance and has the extension; the structures outlive the call.
-        unsafe { instance.get_physical_device_memory_properties2(*physical, &mut properties) };
-        budget.heap_budget[*index].saturating_sub(budget.heap_usage[*index]).min(*bytes)
+        self.handles.heap.left()
     }
 
     /// Whether its buffers are in the host's memory: it is the processor.
@@ -410,10 +396,7 @@ impl Handles {
             max_buffer_bytes: u64::from(limits.max_storage_buffer_range)
                 .min(maintenance3.max_memory_allocation_size)
                 .min(maintenance4.max_buffer_size),
-            heap: {
-                let (index, bytes) = buffer_heap(&device, &heaps);
-                Heap { index, bytes, budget: parts.memory_budget.then(|| (instance.clone(), physical)) }
-            },
+            heap: Heap::of(&device, &heaps, parts.memory_budget.then(|| (instance.clone(), physical))),
             allocator: None,
             log: parts.log,
             owned: None,
@@ -516,23 +499,4 @@ fn is_named(info: &DeviceInfo, wanted: &str) -> bool {
     }
     let hex = |text: &str| text.replace('-', "");
     !wanted.is_empty() && (info.name.to_lowercase().contains(&wanted) || hex(&info.uuid) == hex(&wanted))
-}
-
-/// Index and size of the largest heap from which a buffer like ours can come, device-local if there is one.
-fn buffer_heap(device: &ash::Device, heaps: &vk::PhysicalDeviceMemoryProperties) -> (usize, u64) {
-    let create = super::buffer::create_info(Slot::ALL.len() as u64);
-    let query = vk::DeviceBufferMemoryRequirements::default().create_info(&create);
-    let mut needs = vk::MemoryRequirements2::default();
-    // SAFETY: the device speaks Vulkan 1.3 with maintenance4; the structures outlive the call.
-    unsafe { device.get_device_buffer_memory_requirements(&query, &mut needs) };
-    let types = heaps.memory_types_as_slice().iter().enumerate();
-    types
-        .filter(|(i, _)| needs.memory_requirements.memory_type_bits & (1 << i) != 0)
-        .map(|(_, kind)| {
-            let local = kind.property_flags.contains(vk::MemoryPropertyFlags::DEVICE_LOCAL);
-            let index = kind.heap_index as usize;
-            (local, heaps.memory_heaps[index].size, index)
-        })
-        .max()
-        .map_or((0, 0), |(_, size, index)| (index, size))
 }

@@ -1,4 +1,4 @@
-//! Where device memory comes from: gpu-allocator, or an allocator of the caller's.
+//! Where device memory comes from: gpu-allocator, or an allocator of the caller's; and how much is left of it.
 
 use super::{Location, device::lock};
 use ash::vk;
@@ -85,5 +85,49 @@ unsafe impl Allocator for Mutex<memory::Allocator> {
         let given = allocation.token.and_then(|token| token.downcast::<memory::Allocation>().ok());
         let freed = given.map(|given| lock(self).free(*given));
         debug_assert!(matches!(freed, Some(Ok(()))), "an allocation is freed once, by its allocator");
+    }
+}
+
+/// The memory heap that device buffers come from.
+pub(super) struct Heap {
+    pub bytes: u64,
+    index: usize,
+    /// To be asked how much of it is left; none without VK_EXT_memory_budget.
+    budget: Option<(ash::Instance, vk::PhysicalDevice)>,
+}
+
+impl Heap {
+    /// The largest from which a buffer like ours can come, device-local if there is one.
+    pub fn of(
+        device: &ash::Device,
+        heaps: &vk::PhysicalDeviceMemoryProperties,
+        budget: Option<(ash::Instance, vk::PhysicalDevice)>,
+    ) -> Heap {
+        let create = super::buffer::create_info(4);
+        let query = vk::DeviceBufferMemoryRequirements::default().create_info(&create);
+        let mut needs = vk::MemoryRequirements2::default();
+        // SAFETY: the device speaks Vulkan 1.3 with maintenance4; the structures outlive the call.
+        unsafe { device.get_device_buffer_memory_requirements(&query, &mut needs) };
+        let types = heaps.memory_types_as_slice().iter().enumerate();
+        let (_, bytes, index) = types
+            .filter(|(i, _)| needs.memory_requirements.memory_type_bits & (1 << i) != 0)
+            .map(|(_, kind)| {
+                let local = kind.property_flags.contains(vk::MemoryPropertyFlags::DEVICE_LOCAL);
+                let index = kind.heap_index as usize;
+                (local, heaps.memory_heaps[index].size, index)
+            })
+            .max()
+            .unwrap_or_default();
+        Heap { bytes, index, budget }
+    }
+
+    /// Bytes that this process may still take.
+    pub fn left(&self) -> u64 {
+        let Some((instance, physical)) = &self.budget else { return self.bytes };
+        let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+        let mut properties = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
+        // SAFETY: the physical device is of this instance and has the extension; the structures outlive the call.
+        unsafe { instance.get_physical_device_memory_properties2(*physical, &mut properties) };
+        budget.heap_budget[self.index].saturating_sub(budget.heap_usage[self.index]).min(self.bytes)
     }
 }
