@@ -5,7 +5,7 @@ use crate::{
     gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
     reference::Inputs,
     render::SPIRV,
-    shared::{Features, Shading, Slot, Step, WORKGROUP},
+    shared::*,
 };
 use bytemuck::Pod;
 use glam::{UVec4, Vec3};
@@ -13,6 +13,21 @@ use std::{borrow::Cow, collections::HashMap};
 
 /// The SPIR-V of `functions`, a kernel that evaluates the functions which the others share. No renderer has it.
 pub const FUNCTIONS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/functions.spv"));
+
+/// All that shared functions may ask for, so that `functions` is compiled once: a driver takes seconds for it.
+const EVERYTHING: Features = Features {
+    projection: PROJECTION_MIS,
+    environment: ENVIRONMENT_IMAGE,
+    batches: 0,
+    counters: 0,
+    emitters: 1,
+    rough: ROUGHNESS_ROWS,
+    textures: 1 << TEXTURE_BASE_COLOR,
+    models: (1 << (MODEL_LAMBERT + 1)) - 1,
+    curvature: 1,
+    recorded: 0,
+    mixtures: 0,
+};
 
 /// A device, and kernels made on it of modules that can be replaced.
 pub struct Bench {
@@ -174,7 +189,7 @@ impl Bench {
         // Every invocation reads its own.
         let mut shadings = inputs.shadings.to_vec();
         shadings.resize(shadings.len().max(x.len()), Shading::default());
-        let inputs = Inputs { shadings: &shadings, ..*inputs };
+        let inputs = Inputs { features: EVERYTHING, shadings: &shadings, ..*inputs };
         let buffers: Vec<_> =
             [(Slot::BatchSums, bytemuck::cast_slice(x))].into_iter().chain(buffers.iter().copied()).collect();
         let loaded = self.run("functions", &inputs, nodes, &step, &buffers)?;
