@@ -52,9 +52,10 @@ fn dropped_barriers_are_named() {
     let (sound, barriers, messages) = image(usize::MAX);
     assert!(messages.is_empty() && barriers > 6, "{barriers} barriers: {messages:#?}");
 
-    // `resolve` comes in a submission of its own, after a wait.
-    let kernels = ["sample", "reproject", "accumulate", "reflect"];
-    let mut named = [false; 4];
+    // Who reads what another has written is named; of kernels that add to the same sums, such as `reflect`, the validation
+    // layer (1.3.239) says nothing, and `resolve` comes in a submission of its own, after a wait.
+    let kernels = ["sample", "reproject", "accumulate"];
+    let mut named = [false; 3];
     // From the end, since validation repeats one kind of message ten times only.
     for dropped in (0..barriers).rev() {
         let (found, _, messages) = image(dropped);
