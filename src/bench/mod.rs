@@ -36,7 +36,7 @@ pub const MAX_REPEATS: u32 = 200;
 pub struct Effort {
     /// Samples of each pixel in a repeat, from sample 0.
     pub samples: u32,
-    /// Repeats that are not counted: drivers compile at the first.
+    /// Repeats that are not counted, 0 to [`MAX_REPEATS`]: drivers compile at the first.
     pub warmup: u32,
     /// Repeats that are, 1 to [`MAX_REPEATS`].
     pub repeat: u32,
@@ -56,8 +56,9 @@ pub fn run(
     progress: &mut dyn FnMut(u32),
 ) -> Result<Report> {
     let Effort { samples, warmup, repeat } = effort;
-    if samples == 0 || !(1..=MAX_REPEATS).contains(&repeat) {
-        return Err(Error::setting("bench", format!("needs a sample or more, and 1 to {MAX_REPEATS} repeats")));
+    if samples == 0 || !(1..=MAX_REPEATS).contains(&repeat) || warmup > MAX_REPEATS {
+        let problem = format!("needs a sample or more, 1 to {MAX_REPEATS} repeats, and no more of them before");
+        return Err(Error::setting("bench", problem));
     }
     let timeline = settings.timeline.clone().unwrap_or_default();
     let settings = Settings { timeline: Some(timeline.clone()), ..settings.clone() };
@@ -91,8 +92,8 @@ pub fn run(
     Ok(report)
 }
 
-/// What made the numbers; it may differ between runs that are compared.
-fn about(device: &Device) -> Value {
+/// What makes the numbers: version, hash of the kernels, device, driver. It may differ between runs that are compared.
+pub fn about(device: &Device) -> Value {
     let info = device.info();
     json!({
         "version": env!("CARGO_PKG_VERSION"), "spirvHash": spirv_hash(),

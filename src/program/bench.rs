@@ -30,7 +30,8 @@ pub struct Bench {
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_REPEATS)))]
     repeat: u32,
     /// Repeats before, which are not: drivers compile at the first.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_REPEATS)))]
     warmup: u32,
     /// Key of all random numbers.
     #[arg(long, value_name = "S", default_value_t = 0)]

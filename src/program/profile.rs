@@ -4,9 +4,8 @@ use super::{
     Failure,
     tables::{aligned, quoted, row},
 };
-use serde_json::{Value, json};
 use std::{fmt::Write, path::PathBuf};
-use translucent::{Device, image::write_whole, profile::Timeline, render::spirv_hash};
+use translucent::{Device, bench::about, image::write_whole, profile::Timeline, render::spirv_hash};
 
 /// Writes each file whole or not at all: a trace, or a table where the name ends in .csv.
 pub fn write(timeline: &Timeline, device: &Device, files: &[PathBuf]) -> Result<(), Failure> {
@@ -17,15 +16,6 @@ pub fn write(timeline: &Timeline, device: &Device, files: &[PathBuf]) -> Result<
         write_whole(file, text.as_bytes())?;
     }
     Ok(())
-}
-
-/// What made the numbers.
-pub fn about(device: &Device) -> Value {
-    let info = device.info();
-    json!({
-        "version": env!("CARGO_PKG_VERSION"), "spirvHash": spirv_hash(),
-        "device": info.name, "driver": info.driver, "uuid": info.uuid, "kind": info.kind.to_string(),
-    })
 }
 
 /// One row for each kernel. Columns are only ever added, at the end.
