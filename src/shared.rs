@@ -130,6 +130,14 @@ macro_rules! features {
                 vec![$(($id, self.$field),)*]
             }
 
+            /// What has the value that `value` knows of each constant's id.
+            ///
+            /// # Errors
+            /// The id of which it knows none.
+            pub fn with(value: impl Fn(u32) -> Option<u32>) -> Result<Features, u32> {
+                Ok(Features { $($field: value($id).ok_or::<u32>($id)?,)* })
+            }
+
             /// Every specialization constant for a reader: its name in GLSL, id and value, and what it is.
             pub fn named(&self) -> Vec<NamedFeature> {
                 vec![$(NamedFeature {

@@ -102,8 +102,7 @@ impl Commands {
         times: Option<Timestamps>,
     ) {
         assert!(kernel.objects.layout.objects.is_of(&self.handles) && bindings.objects.is_of(&self.handles));
-        let groups = invocations.div_ceil(kernel.objects.workgroup);
-        let rows = groups.div_ceil(self.handles.limits.max_compute_work_group_count[0]).max(1);
+        let [columns, rows] = self.handles.groups(invocations, kernel.objects.workgroup);
         let layout = kernel.objects.layout.objects.pipeline;
         let (device, commands) = (&self.handles.device, self.raw);
         self.begin_label(&kernel.objects.label);
@@ -119,7 +118,7 @@ impl Commands {
             if let Some(Timestamps { pool, first }) = times {
                 device.cmd_write_timestamp2(commands, stage, pool, first);
             }
-            device.cmd_dispatch(commands, groups.div_ceil(rows), rows, 1);
+            device.cmd_dispatch(commands, columns, rows, 1);
             if let Some(Timestamps { pool, first }) = times {
                 device.cmd_write_timestamp2(commands, stage, pool, first + 1);
             }

@@ -141,6 +141,7 @@ pub(super) struct Handles {
     pub pipeline_cache: vk::PipelineCache,
     pub info: DeviceInfo,
     pub limits: vk::PhysicalDeviceLimits,
+    pub subgroup_size: u32,
     /// 0 where the queue has no timestamps.
     pub timestamp_bits: u32,
     pub profiling: Profiling,
@@ -275,6 +276,21 @@ impl Device {
         self.handles.max_buffer_bytes
     }
 
+    /// Vulkan's limits of the device.
+    pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
+        &self.handles.limits
+    }
+
+    /// Invocations of a subgroup, as `VkPhysicalDeviceSubgroupProperties` has it.
+    pub fn subgroup_size(&self) -> u32 {
+        self.handles.subgroup_size
+    }
+
+    /// Workgroups across and down in a dispatch of so many invocations; more than 0.
+    pub fn groups(&self, invocations: u32, workgroup: u32) -> [u32; 2] {
+        self.handles.groups(invocations, workgroup)
+    }
+
     /// Bytes of the largest memory heap that device buffers can use. Drivers may hand out more than there is, so
     /// keep well below it.
     pub fn heap_size(&self) -> u64 {
@@ -364,8 +380,11 @@ impl Handles {
         let mut maintenance3 = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut maintenance4 = vk::PhysicalDeviceMaintenance4Properties::default();
         let mut host = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
-        let mut properties =
-            vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance3).push_next(&mut maintenance4);
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut maintenance3)
+            .push_next(&mut maintenance4)
+            .push_next(&mut subgroup);
         if parts.host_import {
             properties = properties.push_next(&mut host);
         }
@@ -390,6 +409,7 @@ impl Handles {
             pipeline_cache: parts.pipeline_cache,
             info: parts.info,
             limits,
+            subgroup_size: subgroup.subgroup_size,
             timestamp_bits: families[family as usize].timestamp_valid_bits,
             profiling: Profiling::default(),
             force_staging: false,
@@ -402,6 +422,13 @@ impl Handles {
             owned: None,
             device,
         }
+    }
+
+    /// As [`Device::groups`].
+    pub fn groups(&self, invocations: u32, workgroup: u32) -> [u32; 2] {
+        let groups = invocations.div_ceil(workgroup);
+        let rows = groups.div_ceil(self.limits.max_compute_work_group_count[0]).max(1);
+        [groups.div_ceil(rows), rows]
     }
 
     /// Memory for one buffer.

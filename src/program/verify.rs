@@ -1,11 +1,16 @@
 //! `verify`: every kernel and function against its twin, in the words of googletest.
 
 use super::{Failure, print};
-use std::{path::PathBuf, process::ExitCode, time::Duration};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    time::Duration,
+};
 use translucent::{
     Device, DeviceOptions,
     image::{check_writable, write_whole},
-    verify::{Expectations, compiler, protocol, spirv_hash},
+    verify::{Bench, Expectations, compiler, protocol, replay, spirv_hash},
 };
 
 #[derive(clap::Args)]
@@ -43,10 +48,25 @@ pub struct Verify {
     /// Write the results as a table.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write every dispatch of a test that fails to a folder of its own: SPIR-V, buffers before and after, constants,
+    /// device, and a script for Amber.
+    #[arg(long, value_name = "DIR")]
+    dump: Option<PathBuf>,
+    /// With --dump, also those of tests that pass.
+    #[arg(long, requires = "dump")]
+    dump_all: bool,
+    /// Run one dumped dispatch again and compare, bit for bit; no tests. The folder is trusted: its SPIR-V and buffers
+    /// go to the driver as they are.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["list", "filter", "fraction", "repeat", "timeout", "baseline",
+        "flakes", "skips", "junit", "csv", "dump"])]
+    replay: Option<PathBuf>,
 }
 
 impl Verify {
     pub fn run(self) -> Result<ExitCode, Failure> {
+        if let Some(folder) = &self.replay {
+            return self.replay(folder);
+        }
         let tests = protocol::select(&self.filter);
         if self.list {
             print(&protocol::list(&tests))?;
@@ -59,7 +79,10 @@ impl Verify {
         for file in self.junit.iter().chain(&self.csv) {
             check_writable(file)?;
         }
-        let device = Device::open(&DeviceOptions { device: self.device.clone(), ..DeviceOptions::default() })?;
+        if let Some(folder) = &self.dump {
+            fs::create_dir_all(folder).map_err(|error| Failure::input(format!("{}: {error}", folder.display())))?;
+        }
+        let device = self.open()?;
         let info = device.info();
         let properties = [
             ("device", info.name.clone()),
@@ -76,6 +99,8 @@ impl Verify {
             timeout: Duration::from_secs(self.timeout),
             expectations,
             modules: vec![],
+            dump: self.dump.clone(),
+            dump_all: self.dump_all,
         };
         let mut unwritten = None;
         let outcomes = protocol::run(&device, &tests, &options, &mut |line| {
@@ -92,6 +117,25 @@ impl Verify {
         }
         let good = outcomes.iter().all(|outcome| outcome.status.is_success());
         Ok(ExitCode::from(u8::from(!good)))
+    }
+
+    fn open(&self) -> translucent::Result<Device> {
+        Device::open(&DeviceOptions { device: self.device.clone(), ..DeviceOptions::default() })
+    }
+
+    /// Exit status 0 where the device gives the bits that were recorded, else 1.
+    fn replay(&self, folder: &Path) -> Result<ExitCode, Failure> {
+        let dispatch = replay::read(folder).map_err(Failure::while_reading)?;
+        let device = self.open()?;
+        let found = Bench::new(&device)?.replay(&dispatch)?;
+        let differences = replay::compare(&found, &dispatch.after);
+        let equal = differences.iter().all(|difference| difference.census.total() == 0);
+        let info = device.info();
+        let mut text = format!("kernel `{}` on {}, {}\n", dispatch.stem, info.name, info.driver);
+        differences.iter().for_each(|difference| text.push_str(&format!("{difference}\n")));
+        text.push_str(if equal { "as recorded\n" } else { "not as recorded\n" });
+        print(&text)?;
+        Ok(ExitCode::from(u8::from(!equal)))
     }
 
     fn expectations(&self) -> translucent::Result<Expectations> {

@@ -117,15 +117,19 @@ impl Bench {
             (Slot::Mixtures, bytemuck::cast_slice(inputs.mixtures)),
         ];
         let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
+        self.bind(inputs.features, given)
+    }
+
+    fn bind<'a>(&self, features: Features, buffers: impl Iterator<Item = (Slot, &'a [u8])>) -> Result<Loaded> {
         let make = |(slot, data): (Slot, &[u8])| {
             let buffer = Buffer::new(&self.device, slot.name(), data.len() as u64, Location::Device)?;
             upload(&self.device, &buffer, data)?;
             Ok((slot, buffer))
         };
-        let buffers = given.map(make).collect::<Result<Vec<_>>>()?;
+        let buffers = buffers.map(make).collect::<Result<Vec<_>>>()?;
         let bound: Vec<_> = buffers.iter().map(|(slot, buffer)| (*slot, buffer)).collect();
         let bindings = Bindings::new(&self.layout, &bound)?;
-        Ok(Loaded { features: inputs.features, bindings, buffers })
+        Ok(Loaded { features, bindings, buffers })
     }
 
     /// Runs one kernel, with `step.pixel_count` invocations.
@@ -153,6 +157,19 @@ impl Bench {
             record.push(Dispatch { stem, spirv, features, workgroup, step: *step, before, after });
         }
         Ok(())
+    }
+
+    /// Runs a dispatch again, from what its buffers held before; what they hold then. Its SPIR-V must be valid, and made
+    /// for buffers of these sizes.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a workgroup that the device cannot do; [`Error::Vulkan`], [`Error::Memory`].
+    pub fn replay(&mut self, dispatch: &Dispatch) -> Result<Vec<(Slot, Vec<u8>)>> {
+        let Dispatch { stem, spirv, features, workgroup, step, before, .. } = dispatch;
+        let kernel = Kernel::new(&self.layout, stem, spirv, features, *workgroup)?;
+        let loaded = self.bind(*features, before.iter().map(|(slot, data)| (*slot, data.as_slice())))?;
+        self.submit(&kernel, &loaded, step)?;
+        self.contents(&loaded)
     }
 
     /// Loads, runs one kernel once, and returns the buffers as it left them.

@@ -19,16 +19,20 @@
 //! ```
 //!
 //! `translucent verify` runs them in googletest's words ([`protocol`]), so that deqp-runner's `gtest-runner` drives it:
-//! `gtest-runner run --gtest translucent --output results --baseline fails.txt -- verify`.
+//! `gtest-runner run --gtest translucent --output results --baseline fails.txt -- verify`. What a failing test gave to the
+//! device, and what came of it, [`dump`] keeps for a driver's developer and [`replay`] runs again.
 
+mod amber;
 mod bench;
 pub mod cases;
+pub mod dump;
 mod expectations;
 pub mod functions;
 pub mod geometry;
 pub mod image;
 pub mod profiles;
 pub mod protocol;
+pub mod replay;
 pub mod stages;
 pub mod surfaces;
 mod verdict;
@@ -192,9 +196,14 @@ pub fn spirv_hash() -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Which compiler made the SPIR-V: number and version of the tool, as the Khronos registry of generators lists them.
+/// Which compiler made the SPIR-V of the kernels: number and version of the tool, as Khronos lists them.
 pub fn compiler() -> String {
-    let word = FUNCTIONS.get(8..12).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
+    generator(FUNCTIONS)
+}
+
+/// Number and version of the tool that made a module, as the Khronos registry of generators lists them.
+fn generator(spirv: &[u8]) -> String {
+    let word = spirv.get(8..12).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
     let tool = match word >> 16 {
         8 => "glslang",
         13 => "shaderc over glslang",

@@ -1,9 +1,10 @@
 //! Tests run one after another, told in googletest's words; and their results as JUnit and CSV.
 
-use super::{Bench, Context, Expectations, TESTS, Test, Verdict};
+use super::{Bench, Context, Dispatch, Expectations, TESTS, Test, Verdict, dump};
 use crate::{error::Result, gpu::Device};
 use std::{
     fmt::Write,
+    path::PathBuf,
     sync::mpsc,
     thread,
     time::{Duration, Instant},
@@ -74,6 +75,10 @@ pub struct Options {
     pub expectations: Expectations,
     /// SPIR-V in place of what the build made, by stem.
     pub modules: Vec<(&'static str, Vec<u8>)>,
+    /// The folder in which [`dump::write`] keeps the dispatches of tests that fail.
+    pub dump: Option<PathBuf>,
+    /// It also keeps those of tests that pass.
+    pub dump_all: bool,
 }
 
 impl Default for Options {
@@ -84,6 +89,8 @@ impl Default for Options {
             timeout: Duration::from_secs(60),
             expectations: Expectations::default(),
             modules: vec![],
+            dump: None,
+            dump_all: false,
         }
     }
 }
@@ -130,7 +137,8 @@ pub fn list(tests: &[&'static Test]) -> String {
 /// Runs the tests on a device, each after the other, and tells `print` line by line.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`], [`crate::Error::Memory`] if nothing can run at all.
+/// [`crate::Error::Vulkan`], [`crate::Error::Memory`] if nothing can run at all; [`crate::Error::File`],
+/// [`crate::Error::Setting`] if a dump cannot be written.
 pub fn run(
     device: &Device,
     tests: &[&'static Test],
@@ -153,21 +161,26 @@ pub fn run(
             seconds: 0.0,
         };
         let start = Instant::now();
+        let mut dispatches = None;
         let mut outcome = match () {
             () if hung => without(Status::Missing, "a test before did not end"),
             () => {
                 print(&format!("[ RUN      ] {}", test.name));
                 match skipped(test) {
                     true => without(Status::Skip, "left out by the expectations"),
-                    false => results.recv_timeout(options.timeout).unwrap_or_else(|error| {
-                        hung = true;
-                        let message = match error {
-                            mpsc::RecvTimeoutError::Timeout => "ran out of time",
-                            mpsc::RecvTimeoutError::Disconnected => "panicked",
-                        };
-                        let status = if message == "panicked" { Status::Crash } else { Status::Timeout };
-                        without(status, message)
-                    }),
+                    false => match results.recv_timeout(options.timeout) {
+                        Ok((outcome, ran)) => {
+                            dispatches = ran;
+                            outcome
+                        }
+                        Err(error) => {
+                            hung = true;
+                            match error {
+                                mpsc::RecvTimeoutError::Timeout => without(Status::Timeout, "ran out of time"),
+                                mpsc::RecvTimeoutError::Disconnected => without(Status::Crash, "panicked"),
+                            }
+                        }
+                    },
                 }
             }
         };
@@ -183,6 +196,9 @@ pub fn run(
                 _ => "[  FAILED  ]",
             };
             print(&format!("{word} {} ({:.0} ms)", test.name, outcome.seconds * 1e3));
+        }
+        if let (Some(folder), Some(dispatches)) = (&options.dump, dispatches) {
+            dump::write(folder, device, &outcome, &dispatches)?;
         }
         outcomes.push(outcome);
     }
@@ -205,17 +221,22 @@ fn summary(outcomes: &[Outcome]) -> String {
     text
 }
 
+/// What a test came to, and its dispatches if they are to be kept.
+type Ran = (Outcome, Option<Vec<Dispatch>>);
+
 /// Starts the thread on which tests run; it ends after the last of them.
-fn start(device: &Device, tests: Vec<&'static Test>, options: &Options) -> Result<mpsc::Receiver<Outcome>> {
+fn start(device: &Device, tests: Vec<&'static Test>, options: &Options) -> Result<mpsc::Receiver<Ran>> {
     let mut bench = Bench::new(device)?;
     bench.repeat = options.repeat;
     options.modules.iter().for_each(|(stem, spirv)| bench.replace(stem, spirv.clone()));
     let fraction = options.fraction;
+    let (dump, dump_all) = (options.dump.is_some(), options.dump_all);
     // The next test starts when the last one's outcome was taken.
     let (send, receive) = mpsc::sync_channel(0);
     thread::spawn(move || {
         let mut context = Context { fraction, ..Context::new(&mut bench) };
         for test in tests {
+            context.bench.record = dump.then(Vec::new);
             let result = test.run(&mut context);
             let (status, message) = match &result {
                 Ok(verdict) if verdict.passed() => (Status::Pass, verdict.to_string()),
@@ -223,7 +244,8 @@ fn start(device: &Device, tests: Vec<&'static Test>, options: &Options) -> Resul
                 Err(error) => (Status::Crash, error.to_string()),
             };
             let outcome = Outcome { name: test.name, status, verdict: result.ok(), message, seconds: 0.0 };
-            if send.send(outcome).is_err() {
+            let dispatches = context.bench.record.take().filter(|_| dump_all || status != Status::Pass);
+            if send.send((outcome, dispatches)).is_err() {
                 return;
             }
         }

@@ -78,7 +78,7 @@ pub struct Worst {
 /// Values that are wrong, by class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Census {
-    /// Not a number, where one is expected.
+    /// Not a number, or a number where none is expected.
     pub nan: usize,
     /// Infinite, or finite where infinity is expected.
     pub infinity: usize,
@@ -91,9 +91,34 @@ pub struct Census {
 }
 
 impl Census {
+    /// Counts a wrong value, the one with this number.
+    pub fn add(&mut self, index: usize, found: f32, expected: f32) {
+        self.first.get_or_insert(index);
+        let class = match () {
+            () if found.is_nan() || expected.is_nan() => &mut self.nan,
+            () if found.is_infinite() || expected.is_infinite() => &mut self.infinity,
+            () if found.is_subnormal() || expected.is_subnormal() => &mut self.denormal,
+            () => &mut self.finite,
+        };
+        *class += 1;
+    }
+
     /// Wrong values in all.
     pub fn total(&self) -> usize {
         self.nan + self.infinity + self.denormal + self.finite
+    }
+}
+
+impl fmt::Display for Census {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Census { nan, infinity, denormal, finite, first } = self;
+        write!(f, "{}", self.total())?;
+        match first {
+            Some(first) => {
+                write!(f, " (NaN {nan}, infinity {infinity}, denormal {denormal}, finite {finite}; first {first})")
+            }
+            None => Ok(()),
+        }
     }
 }
 
@@ -175,19 +200,9 @@ impl Verdict {
             let ulp = if relative == 0.0 { 0.0 } else { (f64::from(found) - expected).abs() / ulp(expected) };
             self.worst = Some(Worst { input: input(), found, expected, ulp, relative });
         }
-        if !wrong {
-            return;
+        if wrong {
+            self.census.add(index, found, expected as f32);
         }
-        let rounded = expected as f32;
-        let census = &mut self.census;
-        census.first.get_or_insert(index);
-        let class = match () {
-            () if found.is_nan() != rounded.is_nan() => &mut census.nan,
-            () if found.is_infinite() != rounded.is_infinite() => &mut census.infinity,
-            () if found.is_subnormal() || rounded.is_subnormal() => &mut census.denormal,
-            () => &mut census.finite,
-        };
-        *class += 1;
     }
 
     /// Something else that must hold.
@@ -212,11 +227,7 @@ impl fmt::Display for Verdict {
             let Worst { input, found, expected, ulp, relative } = worst;
             write!(f, "; worst {ulp:.2} ULP, relative {relative:.2e}, at {input}: {found:e} for {expected:e}")?;
         }
-        let Census { nan, infinity, denormal, finite, first } = census;
-        write!(f, "; wrong {}", census.total())?;
-        if let Some(first) = first {
-            write!(f, " (NaN {nan}, infinity {infinity}, denormal {denormal}, finite {finite}; first {first})")?;
-        }
+        write!(f, "; wrong {census}")?;
         if self.exempt > 0.0 {
             write!(f, ", {:.2e} of all may be", self.exempt)?;
         }

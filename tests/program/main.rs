@@ -1,6 +1,8 @@
 //! The program as a user meets it, and the images that it writes.
 
+mod amber;
 mod bench;
+mod dump;
 mod faults;
 mod image;
 mod inspect;

@@ -97,7 +97,7 @@ fn expectations_decide_what_a_run_means() {
 }
 
 /// The SPIR-V of the shared functions with one constant of the hash changed.
-fn faulty(bench: &Bench) -> Vec<u8> {
+pub fn faulty(bench: &Bench) -> Vec<u8> {
     let mut spirv = bench.module("functions").expect("it is built in").to_vec();
     let constant = 0x21f0_aaadu32.to_le_bytes();
     let place = spirv.windows(4).position(|word| word == constant).expect("the hash has it");
