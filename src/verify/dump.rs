@@ -1,7 +1,7 @@
 //! Dispatches written to files, for a driver's developer: all that was given to the device, what it made of it, and a
 //! script that does it again.
 
-use super::{Bound, Dispatch, amber, generator, protocol::Outcome};
+use super::{Bound, Dispatch, Verdict, amber, generator, protocol::Outcome};
 use crate::{
     error::{Error, Result},
     gpu::Device,
@@ -98,14 +98,15 @@ fn write_one(folder: &Path, device: &Device, outcome: &Outcome, dispatch: &Dispa
 
     let bits = outcome.verdict.as_ref().is_some_and(|verdict| verdict.bound == Bound::Exact);
     let (info, status) = (device.info(), outcome.status.name());
-    let meaning = match bits {
-        true => {
-            "The expectations hold where a device gives its bits. The test asks for bits: a sound device that gives \
-                 others shows\nthat this one is at fault."
+    let meaning = match (bits, outcome.verdict.as_ref().is_some_and(Verdict::passed)) {
+        (true, true) => "The test passed, and where it compares bits every sound device leaves the same.",
+        (true, false) => {
+            "The test asks for bits, and some are wrong, here or in its other dispatches. The expectations are what this \
+             device\nleft: they hold where a device has the same fault."
         }
-        false => {
-            "The test does not ask for bits, only for what the verdict names, and a sound device may give others: \
-                  the expectations,\nwhich hold where a device gives this one's bits, are comments."
+        (false, _) => {
+            "The test does not ask for bits, and a sound device may leave others: the expectations, which are what this \
+             device left,\nare comments."
         }
     };
     let comment = format!(
