@@ -46,7 +46,11 @@ pub fn parse(text: &str) -> Parsed<Script> {
                     require(!rest.is_empty(), "BUFFER missing END")?;
                     match statement(&mut rest)[..] {
                         ["END"] => break,
-                        ref words => words.iter().try_for_each(|word| Ok::<_, String>(values.push(number(word)?)))?,
+                        ref words => {
+                            for word in words {
+                                values.push(number(word)?);
+                            }
+                        }
                     }
                 }
                 require(!values.is_empty(), format!("{name} has no data"))?;
