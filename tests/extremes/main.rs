@@ -7,6 +7,8 @@
 mod harness;
 mod matter;
 mod opaque_limit;
+#[path = "../common/pool.rs"]
+mod pool;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
 mod scenes;

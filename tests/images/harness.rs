@@ -1,16 +1,14 @@
-//! Renders for tests, on one device under the validation layer.
+//! Renders for tests, on a few devices under the validation layer.
 
-use std::sync::{Mutex, MutexGuard, OnceLock};
+use crate::pool::{self, Pool};
+use std::sync::{MutexGuard, OnceLock};
 use translucent::{Device, DeviceOptions, Renderer, Scene, Settings, image::Image};
 
-/// The device that all tests share, one test at a time.
+/// The device of this test, for it alone as long as it is held.
 pub fn device() -> MutexGuard<'static, Device> {
-    static DEVICE: OnceLock<Mutex<Device>> = OnceLock::new();
-    let open = || {
-        let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
-        Mutex::new(Device::open(&options).expect("a Vulkan device and the validation layer"))
-    };
-    DEVICE.get_or_init(open).lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    static DEVICES: Pool<Device> = [const { OnceLock::new() }; 2];
+    let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
+    pool::own(&DEVICES, || Device::open(&options).expect("a Vulkan device and the validation layer"))
 }
 
 /// Renders `samples` samples and checks that validation has nothing to say and no sample was invalid.

@@ -13,6 +13,8 @@ mod lambert;
 mod lights;
 mod measure;
 mod mixtures;
+#[path = "../common/pool.rs"]
+mod pool;
 mod repeatable;
 mod scenes;
 mod single;

@@ -9,6 +9,8 @@ mod math;
 mod models;
 mod mutants;
 mod overflow;
+#[path = "../common/pool.rs"]
+mod pool;
 mod recording;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
@@ -24,7 +26,8 @@ mod watertight;
 
 use bytemuck::Pod;
 use glam::{UVec4, Vec3};
-use std::sync::{Mutex, MutexGuard, OnceLock};
+use pool::Pool;
+use std::sync::{MutexGuard, OnceLock};
 use translucent::{
     Device, DeviceOptions, Scene, Settings,
     reference::Inputs,
@@ -32,15 +35,14 @@ use translucent::{
     verify::{Bench, Case, Loaded},
 };
 
-/// The bench that all tests share, one test at a time.
+/// The bench of this test, for it alone as long as it is held.
 pub fn bench() -> MutexGuard<'static, Bench> {
-    static BENCH: OnceLock<Mutex<Bench>> = OnceLock::new();
-    let make = || {
+    static BENCHES: Pool<Bench> = [const { OnceLock::new() }; 2];
+    pool::own(&BENCHES, || {
         let options = DeviceOptions { validation: true, ..DeviceOptions::default() };
         let device = Device::open(&options).expect("a Vulkan device and the validation layer");
-        Mutex::new(Bench::new(&device).expect("bench"))
-    };
-    BENCH.get_or_init(make).lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+        Bench::new(&device).expect("bench")
+    })
 }
 
 /// Validation must have had nothing to say.
