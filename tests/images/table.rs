@@ -30,7 +30,7 @@ fn image_is_the_twins() {
     let mut all = vec![];
     for projection in [Projection::Mis, Projection::Camera] {
         let scene = uniform(ball([8.0, 4.0, 2.0], [0.3, 0.2, 0.1], 1.4, true));
-        let (image, twins) = both(&scene, &Settings { projection, directions: 2, ..settings(16) }, 8);
+        let (image, twins) = both(&scene, &Settings { projection, directions: 2, ..settings(16) }, 4);
         all.extend(differences(&image, &twins));
     }
     all.sort_by(f64::total_cmp);
