@@ -11,7 +11,6 @@ mod mutants;
 mod overflow;
 #[path = "../common/pool.rs"]
 mod pool;
-mod recording;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
 mod scenes;

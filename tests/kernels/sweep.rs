@@ -24,7 +24,7 @@ use translucent::{
     },
     scene::{Environment, EnvironmentMap},
     settings::Model,
-    shared::{BATCHES, Hits, MISS, Material, Pixel, Probe, Slot, Step, Sums, Surface},
+    shared::{BATCHES, Hits, MISS, Material, Pixel, Probe, Slot, Step, Sums, Surface, Triangle},
     verify::Case,
 };
 
@@ -152,6 +152,15 @@ fn surfaces(inputs: &Inputs, seed: u32) -> Vec<Surface> {
     (0..PIXELS).map(|_| surface()).collect()
 }
 
+/// Flatness below which a triangle is a sliver: rounding turns its normal by 2^-24 over that, 6e-6 or more, so that on its
+/// length the shadow offset no longer clears it.
+const SLIVER: f64 = 0.01;
+
+fn sliver(triangle: &Triangle) -> bool {
+    let [_, a, b] = triangle.corner_and_edges();
+    a.cross(b).length() < SLIVER * a.length().max(b.length()).max((b - a).length()).powi(2)
+}
+
 /// Distance from which f32 loses where a line passes the set: rounded to 2^-24 of it, positions are known to 6e-6, as
 /// much as the smallest triangles hold in f32 of their own size.
 const FAR: f32 = 100.0;
@@ -188,7 +197,7 @@ impl Census {
     fn report(&self, kernel: &str, sets: usize, share: f64) {
         let Census { items, apart, lost, lost_apart } = self;
         println!(
-            "{kernel}: {items} sets, {apart} differ from the twin by more than 1e-3; far ones {lost}, {lost_apart}"
+            "{kernel}: {items} sets, {apart} differ from the twin by more than 1e-3; without an answer in f32 {lost}, {lost_apart}"
         );
         assert!(items + lost == sets && items > lost, "{kernel}: {items} and {lost} of {sets}");
         assert!(self.apart as f64 <= share * self.items as f64, "{kernel}: {} of {}", self.apart, self.items);
@@ -241,11 +250,8 @@ fn sets_through_every_kernel(worlds: std::ops::Range<u32>) {
         let probes: Vec<_> = pixels.clone().map(|i| sample(&inputs, &step, i, &surfaces[i as usize])).collect();
         for (gpu, twin) in out.get::<Probe>(Slot::Probes).iter().zip(&probes) {
             vectors_are_finite(&what, &[gpu.offset, gpu.direction, Vec3::new(gpu.t_min, gpu.t_max, gpu.radius)]);
-            // From a thousand diameters away, whether a camera ray comes near the set is a matter of rounding.
-            let length = |probe: &Probe| probe.offset.length();
-            let far = length(gpu).max(length(twin)) > 2e3;
-            let of = |probe: &Probe| if far { Vec3::ZERO } else { Vec3::splat(length(probe)) };
-            drawn.add(&what, of(gpu), of(twin));
+            let [gpu, twin] = [gpu, twin].map(|probe| Vec3::splat(probe.offset.length()));
+            drawn.add_of(&what, gpu, twin, gpu.max(twin).x > FAR);
         }
 
         let probe_buffer: (Slot, &[u8]) = (Slot::Probes, bytemuck::cast_slice(&probes));
@@ -279,19 +285,21 @@ fn sets_through_every_kernel(worlds: std::ops::Range<u32>) {
             .collect();
         for (index, (gpu, twin)) in gpu.iter().zip(&twins).enumerate() {
             assert_eq!((gpu.invalid, twin.invalid), (0, false), "{what}, pixel {index}");
-            lit.add(&what, gpu.subsurface, twin.radiance.as_vec3());
+            let kept = &hits[index].triangle[..hits[index].count.min(8) as usize];
+            let thin = |triangle: &u32| sliver(&inputs.triangles[*triangle as usize]);
+            let lost = probes[index].offset.length() > FAR || thin(&surfaces[index].triangle) || kept.iter().any(thin);
+            lit.add_of(&what, gpu.subsurface, twin.radiance.as_vec3(), lost);
         }
         let gpu = run_case(&case, "reflect", &step, &buffers).get::<Sums>(Slot::RunningSums);
         let twins: Vec<_> = pixels.map(|i| reflect(&inputs, &step, i, &surfaces[i as usize])).collect();
         for (index, (gpu, twin)) in gpu.iter().zip(&twins).enumerate() {
             assert_eq!((gpu.invalid, twin.invalid), (0, false), "{what}, pixel {index}");
             // A highlight of width 1e-6 is as wide as the rounding of a half vector.
-            let material = inputs.shadings[surfaces[index].triangle as usize].material;
-            let alpha = inputs.materials[material as usize].alpha;
-            let sharp = alpha > 0.0 && alpha < 1e-3;
-            let of = |radiance: Vec3| if sharp { Vec3::ZERO } else { radiance };
+            let triangle = surfaces[index].triangle as usize;
+            let alpha = inputs.materials[inputs.shadings[triangle].material as usize].alpha;
+            let lost = alpha > 0.0 && alpha < 1e-4 || sliver(&inputs.triangles[triangle]);
             assert!(gpu.reflection.is_finite() && gpu.reflection.min_element() >= 0.0, "{what}, pixel {index}");
-            reflected.add(&what, of(gpu.reflection), of(twin.radiance.as_vec3()));
+            reflected.add_of(&what, gpu.reflection, twin.radiance.as_vec3(), lost);
         }
 
         // Sums of every magnitude.
@@ -320,11 +328,12 @@ fn sets_through_every_kernel(worlds: std::ops::Range<u32>) {
         }
     }
     check(&bench());
-    found.report("primary", sets, 1e-3);
-    drawn.report("sample", sets, 1e-3);
     // A ray meets one of a world's 72 edges within rounding (2^-22) once in 1e5.
+    found.report("primary", sets, 2e-5);
+    drawn.report("sample", sets, 2e-5);
     carried.report("reproject", sets, 2e-5);
-    lit.report("accumulate", sets, 1e-2);
-    reflected.report("reflect", sets, 1e-2);
+    // A sample has up to four rays; and either lamp's cosine, which is known to 2^-23, is below 1.2e-4 as often as that.
+    lit.report("accumulate", sets, 3e-4);
+    reflected.report("reflect", sets, 3e-4);
     resolved.report("resolve", sets, 0.0);
 }
