@@ -107,40 +107,40 @@ void main() {
         uint count = hit_lists[index].count;
         if (!(probe.t_min <= probe.t_max) || count == 0u) return;
 
-        // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir).
+        // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir). The round after the
+        // last hit is that of the chosen one: a second copy of this code would take as long again to compile.
         uint kept = min(count, MAX_HITS);
         float cumulative[MAX_HITS];
         float total = 0.0;
+        vec3 f;
+        float given = 1.0;
         if (PROJECTION == PROJECTION_CAMERA) shift = m.camera_rate * probe.radius;
-        for (uint j = 0; j < kept; j++) {
-            vec3 delta = probe.offset + hit_lists[index].t[j] * probe.direction;
-            uint triangle = hit_lists[index].triangle[j];
-            vec3 n = geometric_normal(triangles[triangle]);
-            vec3 from_corner = (s.position - triangles[triangle].vertices[0]) + delta;
-            float p = PROJECTION == PROJECTION_CAMERA ? 1.0 : hit_density(s, m, surface, delta, n);
-            Material local = entered_matter(m, surface, triangle, weights(triangles[triangle], from_corner));
-            vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift);
-            if (PROJECTION == PROJECTION_CAMERA) f *= camera_factor(s, m, probe, delta, n);
+        [[dont_unroll]] for (uint j = 0u; j <= kept; j++) {
+            uint hit = j;
+            if (j == kept) {
+                if (!(total > 0.0)) return;
+                float threshold = unit(scramble(sample_point(DIM_HIT), dimension_key(key, batch, DIM_HIT))) * total;
+                hit = 0u;
+                for (uint i = 1u; i < kept; i++) {
+                    if (cumulative[i - 1u] <= threshold && cumulative[i] > cumulative[i - 1u]) hit = i;
+                }
+            }
+            delta = probe.offset + hit_lists[index].t[hit] * probe.direction;
+            lit = hit_lists[index].triangle[hit];
+            vec3 n = geometric_normal(triangles[lit]);
+            barycentric = weights(triangles[lit], (s.position - triangles[lit].vertices[0]) + delta);
+            local = entered_matter(m, surface, lit, barycentric);
+            f = local.strength * shape_shifted(local, dot(delta, delta), shift);
+            if (PROJECTION == PROJECTION_CAMERA) given = camera_factor(s, m, probe, delta, n);
+            f *= given;
+            if (j == kept) break;
             // In the opaque limit light leaves nowhere else.
             if (MIXED != 0 && has_model(local, MODEL_LAMBERT)) f = vec3(0.0);
+            float p = PROJECTION == PROJECTION_CAMERA ? 1.0 : hit_density(s, m, surface, delta, n);
             total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
             cumulative[j] = total;
         }
-        if (!(total > 0.0)) return;
-        float threshold = unit(scramble(sample_point(DIM_HIT), dimension_key(key, batch, DIM_HIT))) * total;
-        uint chosen = 0;
-        for (uint j = 1; j < kept; j++) {
-            if (cumulative[j - 1] <= threshold && cumulative[j] > cumulative[j - 1]) chosen = j;
-        }
-
-        delta = probe.offset + hit_lists[index].t[chosen] * probe.direction;
-        lit = hit_lists[index].triangle[chosen];
-        barycentric = weights(triangles[lit], (s.position - triangles[lit].vertices[0]) + delta);
-        local = entered_matter(m, surface, lit, barycentric);
         own_value = has_model(local, MODEL_DIRECTIONAL);
-        float given = PROJECTION == PROJECTION_CAMERA
-            ? camera_factor(s, m, probe, delta, s.side * geometric_normal(triangles[lit])) : 1.0;
-        vec3 f = local.strength * shape_shifted(local, dot(delta, delta), shift) * given;
         // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
         factor = (own_value ? vec3(given) : f) * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
     }

@@ -77,14 +77,22 @@ vec3 table_vector(Material m, uint node, uint at) {
     return vec3(profiles[i], profiles[i + 1u], profiles[i + 2u]);
 }
 
-vec3 table_shape(Material m, float r2, float shift) {
-    float area;
-    float bent = table_bent(r2, table_bend.x, area);
-    vec3 f = table_weight * area * table_value(m, table_node, bent);
-    if (CURVATURE != 0 && table_weight < 1.0) {
-        bent = table_bent(r2, table_bend.y, area);
-        f += (1.0 - table_weight) * area * table_value(m, table_node + 1u, bent);
+// Values between the two curvatures. Those of a density are divided by their masses.
+vec3 table_between(Material m, float r2, bool density) {
+    vec3 sum = vec3(0.0);
+    float weight = table_weight;
+    [[dont_unroll]] for (uint k = 0u; k < (CURVATURE != 0 ? 2u : 1u) && weight > 0.0; k++) {
+        float area;
+        float bent = table_bent(r2, table_bend[k], area);
+        vec3 value = weight * area * table_value(m, table_node + k, bent);
+        sum += density ? value * table_vector(m, table_node + k, 2u) : value;
+        weight = 1.0 - table_weight;
     }
+    return sum;
+}
+
+vec3 table_shape(Material m, float r2, float shift) {
+    vec3 f = table_between(m, r2, false);
     if (shift == 0.0) return f;
     // One exponential: the value may be as small as the other factor is large.
     return vec3(f.x > 0.0 ? exp_(log_(f.x) + shift) : 0.0, f.y > 0.0 ? exp_(log_(f.y) + shift) : 0.0,
@@ -93,15 +101,7 @@ vec3 table_shape(Material m, float r2, float shift) {
 
 // Density of the radius per area of the plane. The half-space's mass is 1.
 float table_density(Material m, float r2) {
-    if (CURVATURE == 0) return dot(m.density, table_value(m, table_node, r2));
-    float area;
-    float bent = table_bent(r2, table_bend.x, area);
-    vec3 p = table_weight * area * table_value(m, table_node, bent) * table_vector(m, table_node, 2u);
-    if (table_weight < 1.0) {
-        bent = table_bent(r2, table_bend.y, area);
-        p += (1.0 - table_weight) * area * table_value(m, table_node + 1u, bent) * table_vector(m, table_node + 1u, 2u);
-    }
-    return dot(m.density, p);
+    return dot(m.density, table_between(m, r2, CURVATURE != 0));
 }
 
 // The distance that is bent to a squared distance.

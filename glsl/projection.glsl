@@ -74,16 +74,21 @@ float mixture_density(Seen s, Material m, vec3 delta, vec3 n) {
     // Coordinates in the frame: squared radii about the axes without cancellation.
     vec3 x = vec3(dot(delta, tangent), dot(delta, bitangent), dot(delta, s.normal));
     vec3 x2 = x * x;
-    float p = fractions.x * radial_density(m, x2.x + x2.y) * abs(dot(n, s.normal));
+    // Squared radii and Jacobians of normal, U, V and camera. Loops keep one copy of the profile: kernels compile for
+    // as long as they are.
+    vec4 r2 = vec4(x2.x + x2.y, x2.y + x2.z, x2.z + x2.x, 0.0);
+    vec4 jacobians = abs(vec4(dot(n, s.normal), dot(n, tangent), dot(n, bitangent), 0.0));
     if (PROJECTION == PROJECTION_MIS) {
-        p += fractions.y * radial_density(m, x2.y + x2.z) * abs(dot(n, tangent));
-        p += fractions.z * radial_density(m, x2.z + x2.x) * abs(dot(n, bitangent));
         float q = camera_ratio(s, delta);
         vec3 y = q * (delta - s.wo * (x.z / dot(s.wo, s.normal)));
         vec3 d = normalize(delta * s.inverse_distance - s.wo);
         float cos_plane = abs(dot(s.normal, d));
-        float jacobian = cos_plane > 0.0 ? abs(dot(n, d)) / cos_plane * q * q : 0.0;
-        p += fractions.w * radial_density(m, dot(y, y)) * jacobian;
+        r2.w = dot(y, y);
+        jacobians.w = cos_plane > 0.0 ? abs(dot(n, d)) / cos_plane * q * q : 0.0;
+    }
+    float p = 0.0;
+    [[dont_unroll]] for (uint k = 0u; k < (PROJECTION == PROJECTION_MIS ? 4u : 1u); k++) {
+        p += fractions[k] * radial_density(m, r2[k]) * jacobians[k];
     }
     return p;
 }

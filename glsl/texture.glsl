@@ -42,14 +42,15 @@ vec4 texel(Texture t, int x, int y) {
 vec4 texture_at(Texture t, vec2 coordinates) {
     vec2 uv = vec2(within(dot(t.row_u, vec3(coordinates, 1.0)), t.wrap_u),
         within(dot(t.row_v, vec3(coordinates, 1.0)), t.wrap_v)) * vec2(t.width, t.height);
-    if (t.linear == 0u) return texel(t, int(floor(uv.x)), int(floor(uv.y)));
-    uv -= 0.5;
+    if (t.linear != 0u) uv -= 0.5;
     vec2 lower = floor(uv);
     vec2 f = uv - lower;
-    int x = int(lower.x), y = int(lower.y);
-    vec4 top = mix(texel(t, x, y), texel(t, x + 1, y), f.x);
-    vec4 bottom = mix(texel(t, x, y + 1), texel(t, x + 1, y + 1), f.x);
-    return mix(top, bottom, f.y);
+    vec4 around[4];
+    [[dont_unroll]] for (int k = 0; k < (t.linear != 0u ? 4 : 1); k++) {
+        around[k] = texel(t, int(lower.x) + (k & 1), int(lower.y) + (k >> 1));
+    }
+    if (t.linear == 0u) return around[0];
+    return mix(mix(around[0], around[1], f.x), mix(around[2], around[3], f.x), f.y);
 }
 
 // Value of the triangle's texture of this kind; 1 where its material has none.

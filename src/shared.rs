@@ -845,6 +845,7 @@ pub fn glsl() -> String {
         "// What kernels and host share. Written by build.rs from src/shared.rs; do not edit.\n\
          #extension GL_EXT_scalar_block_layout : require\n\
          #extension GL_GOOGLE_include_directive : require\n\
+         #extension GL_EXT_control_flow_attributes : require\n\
          layout(local_size_x_id = 0) in;\n\
          #define read_write\n\n",
     );
