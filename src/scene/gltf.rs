@@ -4,8 +4,9 @@
 //! transforms keep their 64 bits, errors name the item, and no required extension is refused but by our own list.
 
 use super::accessor::Arrays;
+use super::instance::{Instance, Meshes};
 use super::json::{Item, shorten};
-use super::mesh::{self, Finished, Instance, Meshes};
+use super::mesh::{self, Finished, Placed};
 use super::texture::Textures;
 use super::{Camera, Lens, Light, LightKind, LoadOptions, Material, Picture, Set, material, picture, skin};
 use crate::shared::Coordinates;
@@ -14,7 +15,7 @@ use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
 use std::{borrow::Cow, collections::BTreeMap, path::Path};
 
-/// What a file holds, in metres.
+/// What a file holds, or a caller gives, in metres.
 pub(super) struct Raw {
     pub triangles: Vec<mesh::Triangle>,
     /// Placed vertices (m).
@@ -61,9 +62,6 @@ const LEFT_OUT: &[&str] = &[
     "KHR_materials_variants",
 ];
 
-/// Largest coordinate that a transform may give [units of the file].
-const COORDINATE_MAX: f64 = 1e30;
-
 /// Largest vertical angle of a camera (radians): at pi, its picture would be infinitely wide.
 const YFOV_MAX: f64 = 3.13;
 
@@ -84,12 +82,13 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
         .enumerate()
         .map(|(index, item)| material::read(item, index, &textures, options, &mut warnings))
         .collect::<Result<_>>()?;
-    materials.push(material::default_material());
+    materials.push(Material::default());
 
     let arrays = Arrays::new(&root, binary.as_deref())?;
     let nodes = root.list("nodes")?;
     let transforms = place_nodes(&root, &nodes, &mut warnings)?;
-    let mut meshes = Meshes::new(&root, &arrays, &materials)?;
+    let mut meshes = Meshes::new(&root, &arrays)?;
+    let mut placed = Placed::new(&materials);
     let mut lights = Vec::new();
     let mut cameras = Vec::new();
     for (index, (node, transform)) in nodes.iter().zip(&transforms).enumerate() {
@@ -110,7 +109,7 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
             let name = name.clone().unwrap_or_else(|| format!("node {index}"));
             let set = read_set(node)?;
             let instance = Instance { node, name, set, transform, unit: options.unit, joints };
-            meshes.place(&instance, &reference, &mut warnings)?;
+            meshes.place(&instance, &reference, &mut placed, &mut warnings)?;
         }
         if let Some(reference) = node.get("camera")? {
             let list = root.list("cameras")?;
@@ -126,12 +125,9 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<R
             lights.push(read_light(node, item, name, transform, options.unit)?);
         }
     }
+    placed.drop_unused(&mut materials);
     let Finished { triangles, positions, coordinates, sets, dropped } =
-        meshes.finish(file, &mut materials, &mut warnings)?;
-    if triangles.is_empty() {
-        let dropped = if dropped == 0 { String::new() } else { format!(" but {dropped} of zero area") };
-        return Err(Error::scene(file, "scene", format!("has no triangles{dropped}")));
-    }
+        placed.finish(file, &materials, &mut warnings)?;
     let pictures = read_pictures(&root, &arrays, &mut materials)?;
     Ok(Raw { triangles, positions, coordinates, dropped, materials, pictures, sets, lights, cameras, warnings })
 }
@@ -239,9 +235,7 @@ fn place_nodes(root: &Item, nodes: &[Item], warnings: &mut Vec<String>) -> Resul
             return Err(nodes[node].error("is reached twice: a node has one parent at most, and no cycle"));
         }
         let transform = parent * local_transform(&nodes[node])?;
-        if !(transform.is_finite() && transform.to_cols_array().iter().all(|value| value.abs() <= COORDINATE_MAX)) {
-            return Err(nodes[node].error(format!("its transform to the world exceeds {COORDINATE_MAX}")));
-        }
+        mesh::check_transform(&nodes[node], &transform)?;
         transforms[node] = Some(transform);
         waiting.extend(children[node].iter().rev().map(|&child| (child, transform)));
     }

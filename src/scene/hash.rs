@@ -23,15 +23,30 @@ impl Feed {
     }
 }
 
-/// Hex SHA-256 of geometry, materials, lights, cameras and environment. Names of cameras count, for they choose;
-/// other names, the file's place and warnings do not. The BVH follows from the triangles and their order.
-pub(super) fn hash(scene: &Scene) -> String {
+/// SHA-256 of a scene's geometry: frame, triangles with their normals, materials, sets and texture coordinates. The BVH
+/// follows from the triangles and their order.
+pub(crate) type Geometry = [u8; 32];
+
+pub(crate) fn geometry(scene: &Scene) -> Geometry {
     let mut feed = Feed(Sha256::new());
-    feed.bytes(b"translucent scene 2");
     feed.numbers(scene.frame.centre.to_array());
     feed.numbers([scene.frame.scale]);
     feed.bytes(bytemuck::cast_slice(&scene.triangles));
     feed.bytes(bytemuck::cast_slice(&scene.shadings));
+    feed.bytes(bytemuck::cast_slice(&scene.coordinates));
+    for set in &scene.sets {
+        feed.count(set.materials.len());
+        set.materials.iter().for_each(|&material| feed.count(material));
+    }
+    feed.0.finalize().into()
+}
+
+/// Hex SHA-256 of geometry, materials, lights, cameras and environment. Names of cameras count, for they choose;
+/// other names, the file's place and warnings do not.
+pub(crate) fn hash(scene: &Scene, geometry: Geometry) -> String {
+    let mut feed = Feed(Sha256::new());
+    feed.bytes(b"translucent scene 3");
+    feed.bytes(&geometry);
     feed.count(scene.materials.len());
     for material in &scene.materials {
         feed.numbers(material.base_color.to_array());
@@ -69,7 +84,6 @@ pub(super) fn hash(scene: &Scene) -> String {
         feed.numbers([f64::from(picture.width), f64::from(picture.height)]);
         feed.bytes(bytemuck::cast_slice(&picture.texels));
     }
-    feed.bytes(bytemuck::cast_slice(&scene.coordinates));
     feed.count(scene.lights.len());
     for light in &scene.lights {
         feed.numbers(light.position.to_array());

@@ -20,6 +20,11 @@ impl<'a> Item<'a> {
         Item { file, path: String::new(), value }
     }
 
+    /// A thing of a caller's, without JSON, so that messages name it.
+    pub fn of_caller(file: &'a Path, path: String) -> Self {
+        Item { file, path, value: &Value::Null }
+    }
+
     pub fn error(&self, problem: impl Into<String>) -> Error {
         let path = if self.path.is_empty() { "glTF" } else { &self.path };
         Error::scene(self.file, path, problem)

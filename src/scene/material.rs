@@ -20,9 +20,9 @@ use glam::DVec3;
 use std::path::Path;
 
 /// glTF's index of refraction where a material names none.
-const DEFAULT_IOR: f64 = 1.5;
+pub(super) const DEFAULT_IOR: f64 = 1.5;
 /// Indices of refraction within which the Fresnel moments keep their digits.
-const IOR_RANGE: (f64, f64) = (0.1, 10.0);
+pub(super) const IOR_RANGE: (f64, f64) = (0.1, 10.0);
 /// Longest mean free path (m) and largest coefficient [1/m]: beyond, f32 kernels cannot hold the numbers.
 const COEFFICIENT_MAX: f64 = 1e12;
 pub(super) const LENGTH_RANGE: (f64, f64) = (1e-12, 1e12);
@@ -65,25 +65,6 @@ pub(super) const UNMODELLED: &[(&str, &str)] = &[
     ("KHR_materials_sss", "KHR_materials_sss"),
 ];
 
-/// The material of a primitive that names none.
-pub(super) fn default_material() -> Material {
-    Material {
-        name: "default".into(),
-        base_color: DVec3::ONE,
-        metallic: 1.0,
-        roughness: 1.0,
-        emission: DVec3::ZERO,
-        two_sided: false,
-        ior: DEFAULT_IOR,
-        medium: None,
-        set: None,
-        tinted: false,
-        ramp: Vec::new(),
-        textures: Default::default(),
-        hidden: false,
-    }
-}
-
 /// Reads `materials[index]`. The medium is the first of: a preset among the options for the material's name,
 /// `extras.bssrdf`, KHR_materials_scatter, KHR_materials_volume_scatter, none.
 pub(super) fn read<'a>(
@@ -94,7 +75,7 @@ pub(super) fn read<'a>(
     warnings: &mut Vec<String>,
 ) -> Result<Material> {
     let name = item.name()?.unwrap_or_else(|| format!("material {index}"));
-    let mut material = Material { name, ..default_material() };
+    let mut material = Material { name, ..Material::default() };
     read_surface(item, textures, &mut material, warnings)?;
     let authored_ior = read_ior(item, warnings)?;
     material.ior = authored_ior.unwrap_or(DEFAULT_IOR);
@@ -286,7 +267,7 @@ fn read_ior(item: &Item, warnings: &mut Vec<String>) -> Result<Option<f64>> {
 }
 
 /// A table's material, from 1/mm to 1/m.
-fn medium_of(preset: &Preset) -> Medium {
+pub(super) fn medium_of(preset: &Preset) -> Medium {
     Medium {
         sigma_s_prime: preset.sigma_s_prime * 1e3,
         sigma_a: preset.sigma_a * 1e3,

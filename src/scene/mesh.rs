@@ -1,23 +1,22 @@
-//! Meshes of a glTF file, placed by their nodes: triangles in metres, with normals, materials and sets.
+//! Primitives that were placed: triangles in metres, with normals, materials and sets.
 
-use super::accessor::Arrays;
 use super::json::Item;
-use super::primitive::{self, Needs, Primitive};
+use super::primitive::{Needs, Primitive};
 use super::sets::{self, Group};
-use super::{Material, Set, Texture, skin};
-use crate::Result;
+use super::{Material, Set, Texture};
 use crate::shared::{Coordinates, TEXTURE_NORMAL};
+use crate::{Error, Result};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
-use std::collections::HashMap;
 use std::path::Path;
-use std::rc::Rc;
 
 /// Most triangles of a scene: their numbers, and those of the BVH's nodes, must fit into 32 bits.
-const TRIANGLES_MAX: usize = 100_000_000;
+pub(super) const TRIANGLES_MAX: usize = 100_000_000;
 /// A triangle is dropped as one of zero area if twice its area is below this share of its longest edge squared:
 /// edges rounded to f32 would then say little about its normal.
 const FLATNESS_MIN: f64 = 1e-6;
-/// Largest coordinate (m).
+/// Most vertices.
+pub(super) const VERTICES_MAX: usize = 4 * TRIANGLES_MAX;
+/// Largest coordinate (m), and largest number of a transform.
 const COORDINATE_MAX: f64 = 1e30;
 
 /// A triangle in metres.
@@ -52,30 +51,24 @@ impl Triangle {
     }
 }
 
-/// A node that shows a mesh.
-pub(super) struct Instance<'n, 'a> {
+/// Where a primitive is shown.
+pub(super) struct Place<'n, 'a> {
+    /// What shows it, for messages.
     pub node: &'n Item<'a>,
-    pub name: String,
-    /// The set that the node names for its surfaces.
-    pub set: Option<String>,
     pub transform: &'n DAffine3,
-    /// Metres of a unit of the file.
+    /// Metres of a unit of its positions.
     pub unit: f64,
-    /// The matrices of its skin's joints, which then place it and not the node's transform.
-    pub joints: Option<Vec<DAffine3>>,
 }
 
-/// Reads meshes when they are first shown, and collects triangles.
-pub(super) struct Meshes<'r, 'a> {
-    arrays: &'r Arrays<'a>,
-    items: Vec<Item<'a>>,
-    /// What the textures of each material need, the default one last.
-    needs: Vec<Needs>,
+/// All that was placed so far.
+pub(super) struct Placed {
+    /// What the textures of each material need.
+    pub needs: Vec<Needs>,
     normal_maps: Vec<Option<Texture>>,
     hidden: Vec<bool>,
+    /// Sets that materials name.
+    sets: Vec<Option<String>>,
     textured: bool,
-    loaded: HashMap<(usize, Vec<u64>, bool), Rc<Vec<Primitive<'a>>>>,
-    vertices: usize,
     /// Placed vertices (m).
     positions: Vec<DVec3>,
     triangles: Vec<Triangle>,
@@ -87,76 +80,51 @@ pub(super) struct Meshes<'r, 'a> {
     below: u64,
 }
 
-impl<'r, 'a> Meshes<'r, 'a> {
-    /// `materials` are those of the file and, as the last, the default one.
-    pub fn new(root: &Item<'a>, arrays: &'r Arrays<'a>, materials: &[Material]) -> Result<Self> {
+impl Placed {
+    pub fn new(materials: &[Material]) -> Placed {
         let needs = |material: &Material| {
             let mut needs = Needs { tangents: normal_map(material).is_some(), ..Needs::default() };
             material.textures.iter().flatten().for_each(|texture| needs.sets[texture.set as usize] = true);
             needs
         };
-        Ok(Meshes {
-            arrays,
-            items: root.list("meshes")?,
+        Placed {
             textured: materials.iter().any(Material::is_textured),
             needs: materials.iter().map(needs).collect(),
             normal_maps: materials.iter().map(normal_map).collect(),
             hidden: materials.iter().map(|material| material.hidden).collect(),
-            loaded: HashMap::new(),
-            vertices: 0,
+            sets: materials.iter().map(|material| material.set.clone()).collect(),
             positions: Vec::new(),
             triangles: Vec::new(),
             groups: Vec::new(),
             coordinates: Vec::new(),
             dropped: 0,
             below: 0,
-        })
-    }
-
-    /// Adds the triangles of the mesh at `reference`, as `instance` shows it.
-    pub fn place(&mut self, instance: &Instance, reference: &Item<'a>, warnings: &mut Vec<String>) -> Result<()> {
-        let index = reference.index(self.items.len(), "meshes")?;
-        let weights = match instance.node.get("weights")? {
-            Some(weights) => Some(weights),
-            None => self.items[index].get("weights")?,
-        };
-        let weights = weights.map_or(Ok(Vec::new()), |weights| {
-            weights.elements()?.iter().map(|weight| weight.number()).collect::<Result<Vec<_>>>()
-        })?;
-        let primitives = self.load(index, &weights, instance.joints.is_some(), warnings)?;
-        let mut groups: HashMap<usize, usize> = HashMap::new();
-        for primitive in primitives.iter() {
-            if self.hidden[primitive.material] {
-                continue;
-            }
-            let group = *groups.entry(primitive.material).or_insert_with(|| {
-                let (node, set) = (instance.name.clone(), instance.set.clone());
-                self.groups.push(Group { node, material: primitive.material, set });
-                self.groups.len() - 1
-            });
-            match &instance.joints {
-                None => self.place_primitive(instance, instance.transform, primitive, group as u32)?,
-                Some(joints) => {
-                    let posed = skin::posed(primitive, joints)?;
-                    self.place_primitive(instance, &DAffine3::IDENTITY, &posed, group as u32)?;
-                }
-            }
         }
-        Ok(())
     }
 
-    fn place_primitive(
-        &mut self,
-        instance: &Instance,
-        transform: &DAffine3,
-        primitive: &Primitive,
-        group: u32,
-    ) -> Result<()> {
+    /// Whether a material has no surface.
+    pub fn is_hidden(&self, material: usize) -> bool {
+        self.hidden[material]
+    }
+
+    /// The number of a new group: the triangles of a material on what has this name and may name a set.
+    pub fn add_group(&mut self, node: String, material: usize, set: Option<String>) -> u32 {
+        let set = set.or_else(|| self.sets[material].clone());
+        self.groups.push(Group { node, material, set });
+        self.groups.len() as u32 - 1
+    }
+
+    /// Adds the triangles of a primitive that was checked.
+    pub fn place(&mut self, place: &Place, primitive: &Primitive, group: u32) -> Result<()> {
+        let Place { node, transform, unit: metres } = *place;
         if self.triangles.len() + primitive.corners.len() > TRIANGLES_MAX {
-            return Err(instance.node.error(format!("the scene has more than {TRIANGLES_MAX} triangles")));
+            return Err(node.error(format!("the scene has more than {TRIANGLES_MAX} triangles")));
         }
-        let linear = transform.matrix3 * instance.unit;
-        let translation = transform.translation * instance.unit;
+        if self.positions.len() + primitive.positions.len() > VERTICES_MAX {
+            return Err(node.error(format!("the scene has more than {VERTICES_MAX} vertices")));
+        }
+        let linear = transform.matrix3 * metres;
+        let translation = transform.translation * metres;
         let mirrored = linear.determinant() < 0.0;
         let normal_matrix = cofactors(&linear) * if mirrored { -1.0 } else { 1.0 };
         let first = self.positions.len() as u32;
@@ -171,7 +139,7 @@ impl<'r, 'a> Meshes<'r, 'a> {
             let (edge1, edge2) = (linear * (b - a), linear * (c - a));
             let inside = |vector: DVec3| vector.is_finite() && vector.abs().max_element() < COORDINATE_MAX;
             if !(inside(corner) && inside(edge1) && inside(edge2)) {
-                let problem = format!("{} places a vertex beyond {COORDINATE_MAX} m", instance.node.path);
+                let problem = format!("{} places a vertex beyond {COORDINATE_MAX} m", node.path);
                 return Err(primitive.item.error(problem));
             }
             let Some(geometric) = normal(edge1, edge2) else {
@@ -255,50 +223,11 @@ impl<'r, 'a> Meshes<'r, 'a> {
         Some(out)
     }
 
-    /// The primitives of a mesh whose morph targets have these weights.
-    fn load(
-        &mut self,
-        index: usize,
-        weights: &[f64],
-        skinned: bool,
-        warnings: &mut Vec<String>,
-    ) -> Result<Rc<Vec<Primitive<'a>>>> {
-        let key = (index, weights.iter().map(|weight| weight.to_bits()).collect::<Vec<_>>(), skinned);
-        if let Some(primitives) = self.loaded.get(&key) {
-            return Ok(primitives.clone());
-        }
-        let mesh = self.items[index].clone();
-        let mut primitives = Vec::new();
-        for item in mesh.need("primitives")?.elements()? {
-            if let Some(primitive) = primitive::read(self.arrays, item, weights, skinned, &self.needs, warnings)? {
-                self.vertices = self.vertices.saturating_add(primitive.positions.len() + primitive.corners.len());
-                if self.vertices > 4 * TRIANGLES_MAX {
-                    return Err(mesh.error(format!("the scene has more than {} vertices", 4 * TRIANGLES_MAX)));
-                }
-                primitives.push(primitive);
-            }
-        }
-        let primitives = Rc::new(primitives);
-        self.loaded.insert(key, primitives.clone());
-        Ok(primitives)
-    }
-
-    /// All that was placed. Materials that no triangle uses are removed.
-    ///
-    /// # Errors
-    /// If matter of different indices of refraction is in one set.
-    pub fn finish(
-        mut self,
-        file: &Path,
-        materials: &mut Vec<Material>,
-        warnings: &mut Vec<String>,
-    ) -> Result<Finished> {
+    /// Removes materials that no triangle uses.
+    pub fn drop_unused(&mut self, materials: &mut Vec<Material>) {
         let mut used = vec![false; materials.len()];
         for triangle in &self.triangles {
             used[triangle.material as usize] = true;
-        }
-        for group in &mut self.groups {
-            group.set = group.set.take().or_else(|| materials[group.material].set.clone());
         }
         let numbers = renumber(materials, &used);
         for triangle in &mut self.triangles {
@@ -306,6 +235,17 @@ impl<'r, 'a> Meshes<'r, 'a> {
         }
         for group in &mut self.groups {
             group.material = numbers[group.material] as usize;
+        }
+    }
+
+    /// All that was placed.
+    ///
+    /// # Errors
+    /// If there is no triangle, or matter of different indices of refraction is in one set.
+    pub fn finish(mut self, file: &Path, materials: &[Material], warnings: &mut Vec<String>) -> Result<Finished> {
+        if self.triangles.is_empty() {
+            let dropped = if self.dropped == 0 { String::new() } else { format!(" but {} of zero area", self.dropped) };
+            return Err(Error::scene(file, "scene", format!("has no triangles{dropped}")));
         }
         let sets = sets::resolve(file, &mut self.triangles, &self.positions, &self.groups, materials, warnings)?;
         if self.dropped > 0 {
@@ -328,8 +268,16 @@ impl<'r, 'a> Meshes<'r, 'a> {
             true => self.triangles.iter().filter_map(|triangle| self.final_coordinates(triangle)).collect(),
             false => Vec::new(),
         };
-        let Meshes { triangles, positions, dropped, .. } = self;
+        let Placed { triangles, positions, dropped, .. } = self;
         Ok(Finished { triangles, positions, coordinates, sets, dropped })
+    }
+}
+
+/// Refuses a transform to the world that is not finite, or huge.
+pub(super) fn check_transform(item: &Item, transform: &DAffine3) -> Result<()> {
+    match transform.is_finite() && transform.to_cols_array().iter().all(|value| value.abs() <= COORDINATE_MAX) {
+        true => Ok(()),
+        false => Err(item.error(format!("its transform to the world exceeds {COORDINATE_MAX}"))),
     }
 }
 

@@ -1,4 +1,4 @@
-//! A checked, immutable scene: plain data in f64 metres, and geometry in f32 internal units. No Vulkan.
+//! A checked scene: plain data in f64 metres, and geometry in f32 internal units. No Vulkan.
 
 mod accessor;
 mod bvh;
@@ -8,10 +8,13 @@ mod environment;
 mod frame;
 mod gltf;
 mod hash;
+mod instance;
 mod json;
+mod make;
 mod material;
 mod medium;
 mod mesh;
+mod parts;
 mod picture;
 mod presets;
 mod primitive;
@@ -21,10 +24,12 @@ mod skin;
 mod texture;
 mod unit;
 
+pub use parts::Mesh;
 pub use presets::{Preset, preset, presets};
 pub use unit::parse_unit;
 
-pub(crate) use check::{check_camera, check_light};
+pub(crate) use check::{check_camera, check_light, check_material, check_scene};
+pub(crate) use hash::{Geometry, geometry, hash};
 
 use crate::{
     Error, Result,
@@ -35,7 +40,10 @@ use crate::{
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
-/// A scene that passed every check of [`Scene::load`].
+/// A scene that passed every check of [`Scene::load`] or [`Scene::from_meshes`].
+///
+/// Its geometry stays. Materials, lights, cameras and pictures may be changed or filled in by the caller; what breaks a rule
+/// then is refused when a renderer is made or [updated](crate::Renderer::update).
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Where it came from, for messages.
@@ -62,7 +70,7 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// Triangles of zero area, which were left out.
     pub dropped_triangles: u64,
-    /// Hex SHA-256 of everything that determines the image.
+    /// Hex SHA-256 of everything that determines the image, as it was loaded.
     pub hash: String,
 }
 
@@ -131,6 +139,11 @@ impl Scene {
         if !(1e-9..=1e9).contains(&options.unit) {
             return Err(Error::setting("unit", format!("must be from 1e-9 to 1e9 metres, is {}", options.unit)));
         }
+        Scene::assemble(file, gltf::read(file, bytes, options)?, &options.timeline)
+    }
+
+    /// From metres to internal units, with the BVH.
+    fn assemble(file: &Path, raw: gltf::Raw, timeline: &Option<Timeline>) -> Result<Scene> {
         let gltf::Raw {
             triangles,
             positions,
@@ -142,7 +155,7 @@ impl Scene {
             lights,
             cameras,
             mut warnings,
-        } = gltf::read(file, bytes, options)?;
+        } = raw;
         let frame = frame::around(file, &triangles, &materials)?;
         frame::check_nodes(file, &frame, &lights, &cameras)?;
         let frame::Internal { triangles, shadings, coordinates, too_small } =
@@ -150,7 +163,7 @@ impl Scene {
         if too_small > 0 {
             warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
         }
-        let building = profile::begin(&options.timeline, "bvh");
+        let building = profile::begin(timeline, "bvh");
         let (nodes, order) = bvh::build(file, &triangles)?;
         drop(building);
         let mut scene = Scene {
@@ -173,7 +186,7 @@ impl Scene {
             dropped_triangles: dropped + too_small,
             hash: String::new(),
         };
-        scene.hash = hash::hash(&scene);
+        scene.hash = hash(&scene, geometry(&scene));
         Ok(scene)
     }
 
@@ -193,7 +206,7 @@ impl Scene {
             self.warnings.push(format!("{ENVIRONMENT_WARNING}{raised} texels of negative radiance are taken as 0"));
         }
         self.environment = environment;
-        self.hash = hash::hash(self);
+        self.hash = hash(self, geometry(self));
         Ok(())
     }
 }

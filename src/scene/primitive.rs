@@ -21,6 +21,9 @@ pub(super) struct Primitive<'a> {
     pub material: usize,
 }
 
+/// Names of the coordinates.
+const TEXCOORDS: [&str; 2] = ["TEXCOORD_0", "TEXCOORD_1"];
+
 /// What a material's textures need of a primitive.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Needs {
@@ -68,55 +71,69 @@ pub(super) fn read<'a>(
     };
     let mut positions = arrays.vectors(&positions)?;
     let count = positions.len();
-    let counted = |found: usize, what: &str| match found == count {
-        true => Ok(()),
-        false => Err(item.error(format!("has {found} {what} for {count} positions"))),
-    };
     let mut normals = attributes.get("NORMAL")?.map(|normals| arrays.vectors(&normals)).transpose()?;
     let mut tangents = None;
     if needs[material].tangents
         && let Some(reference) = attributes.get("TANGENT")?
     {
-        let numbers = arrays.numbers(&reference, "VEC4")?;
-        counted(numbers.len(), "tangents")?;
-        let sign = |w: f64| if w < 0.0 { -1.0 } else { 1.0 };
-        tangents = Some(numbers.iter().map(|&[x, y, z, w]| (DVec3::new(x, y, z), sign(w))).collect::<Vec<_>>());
-    }
-    if let Some(normals) = &normals {
-        counted(normals.len(), "normals")?;
+        let numbers = arrays.numbers::<4>(&reference, "VEC4")?;
+        tangents = Some(numbers.into_iter().map(tangent).collect::<Vec<_>>());
     }
     morph(arrays, &item, weights, &mut positions, normals.as_deref_mut(), tangents.as_deref_mut())?;
-    if let Some(vertex) = positions.iter().position(|position| !position.is_finite()) {
-        return Err(item.error(format!("the position of vertex {vertex} is {:?}", positions[vertex].to_array())));
-    }
-    if let Some(normals) = &normals
-        && let Some(vertex) = normals.iter().position(|normal| !normal.is_finite())
-    {
-        return Err(item.error(format!("the normal of vertex {vertex} is {:?}", normals[vertex].to_array())));
-    }
-    if let Some(tangents) = &tangents
-        && let Some(vertex) = tangents.iter().position(|(tangent, _)| !tangent.is_finite())
-    {
-        return Err(item.error(format!("the tangent of vertex {vertex} is {:?}", tangents[vertex].0.to_array())));
-    }
     let mut coordinates = [None, None];
-    for (set, key) in ["TEXCOORD_0", "TEXCOORD_1"].into_iter().enumerate().filter(|(set, _)| needs[material].sets[*set])
-    {
-        let Some(reference) = attributes.get(key)? else {
-            warnings.push(item.note(format!("has no {key}, so its textures show one texel")));
-            continue;
-        };
-        let numbers = arrays.numbers::<2>(&reference, "VEC2")?;
-        counted(numbers.len(), key)?;
-        let uv: Vec<[f32; 2]> = numbers.iter().map(|pair| pair.map(|number| number as f32)).collect();
-        if let Some(vertex) = uv.iter().position(|uv| !uv.iter().all(|number| number.is_finite())) {
-            return Err(item.error(format!("{key} of vertex {vertex} is {:?}", numbers[vertex])));
+    for (set, key) in TEXCOORDS.into_iter().enumerate().filter(|(set, _)| needs[material].sets[*set]) {
+        if let Some(reference) = attributes.get(key)? {
+            let numbers = arrays.numbers::<2>(&reference, "VEC2")?;
+            coordinates[set] = Some(numbers.iter().map(|pair| pair.map(|number| number as f32)).collect());
         }
-        coordinates[set] = Some(uv);
     }
     let joints = if skinned { Some(read_joints(arrays, &item, &attributes, count)?) } else { None };
     let corners = read_corners(arrays, &item, mode, count)?;
-    Ok(Some(Primitive { item, positions, normals, tangents, coordinates, joints, corners, material }))
+    let primitive = Primitive { item, positions, normals, tangents, coordinates, joints, corners, material };
+    primitive.check(&needs[material], warnings)?;
+    Ok(Some(primitive))
+}
+
+/// A direction with handedness, of which the sign counts.
+pub(super) fn tangent([x, y, z, w]: [f64; 4]) -> (DVec3, f64) {
+    (DVec3::new(x, y, z), if w < 0.0 { -1.0 } else { 1.0 })
+}
+
+impl Primitive<'_> {
+    /// Refuses arrays that do not fit one another, and numbers that are not finite; says what textures lack.
+    pub fn check(&self, needs: &Needs, warnings: &mut Vec<String>) -> Result<()> {
+        let Primitive { item, positions, normals, tangents, coordinates, .. } = self;
+        let count = positions.len();
+        let vectors = |what: &str, vectors: &mut dyn ExactSizeIterator<Item = DVec3>| {
+            if vectors.len() != count {
+                return Err(item.error(format!("has {} {what}s for {count} positions", vectors.len())));
+            }
+            match vectors.enumerate().find(|(_, vector)| !vector.is_finite()) {
+                None => Ok(()),
+                Some((at, vector)) => Err(item.error(format!("the {what} of vertex {at} is {:?}", vector.to_array()))),
+            }
+        };
+        vectors("position", &mut positions.iter().copied())?;
+        if let Some(normals) = normals {
+            vectors("normal", &mut normals.iter().copied())?;
+        }
+        if let Some(tangents) = tangents {
+            vectors("tangent", &mut tangents.iter().map(|(tangent, _)| *tangent))?;
+        }
+        for (set, key) in TEXCOORDS.into_iter().enumerate().filter(|(set, _)| needs.sets[*set]) {
+            let Some(uv) = &coordinates[set] else {
+                warnings.push(item.note(format!("has no {key}, so its textures show one texel")));
+                continue;
+            };
+            if uv.len() != count {
+                return Err(item.error(format!("has {} {key} for {count} positions", uv.len())));
+            }
+            if let Some(vertex) = uv.iter().position(|uv| !uv.iter().all(|number| number.is_finite())) {
+                return Err(item.error(format!("{key} of vertex {vertex} is {:?}", uv[vertex])));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Adds the displacements of the morph targets, times their weights.
@@ -197,6 +214,11 @@ fn read_corners(arrays: &Arrays, item: &Item, mode: usize, count: usize) -> Resu
         }
         None => (0..u32::try_from(count).map_err(|_| item.error("has too many vertices"))?).collect(),
     };
+    corners(item, &order, mode, count)
+}
+
+/// The vertices of each triangle of a glTF mode: a list (4), strip or fan.
+pub(super) fn corners(item: &Item, order: &[u32], mode: usize, count: usize) -> Result<Vec<[u32; 3]>> {
     if let Some(place) = order.iter().position(|&index| index as usize >= count) {
         return Err(item.error(format!("index {place} is {}, but there are {count} vertices", order[place])));
     }

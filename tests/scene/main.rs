@@ -7,6 +7,7 @@ mod geometry;
 mod materials;
 mod mutations;
 mod nodes;
+mod parts;
 mod poses;
 mod presets;
 mod rules;
