@@ -54,6 +54,11 @@
 //! ([`Device::from_raw`]). There `begin` numbers the samples and `clear` forgets the sums if they do not go on, so what
 //! the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
 //!
+//! *Changes.* Buffers stay when camera, lights, matter, environment or textures change ([`Renderer::update`], and the
+//! cheaper [`Renderer::set_camera`], [`Renderer::set_lights`], [`Renderer::set_material`]): what is different is written,
+//! what would need another pipeline or a larger buffer is refused. Geometry stays; a scene comes from a file or from the
+//! caller's vertices ([`Scene::from_meshes`]), since the BVH is built on the host.
+//!
 //! *Failures.* Every Vulkan call that fails is an error that names the step ([`Error::Vulkan`]); nothing is leaked, and
 //! the renderer keeps the samples whose sums are known. When the device is lost, [`Renderer::with_recovery`] goes on with
 //! another from the sums on the host; the image is the same, bit for bit. Drivers and operating systems give out more
@@ -67,7 +72,7 @@
 //! | [`error`] | nothing | [`Error`]: file, item and problem, or the step |
 //! | [`profile`] | nothing | [`profile::Timeline`]: what takes how long; traces and sums |
 //! | [`settings`] | `shared`, `profile` | [`Settings`]: what a caller may choose |
-//! | [`scene`] | `shared`, `error`, `settings`, `profile` | [`Scene`]: files, rules, geometry, BVH, presets; no Vulkan |
+//! | [`scene`] | `shared`, `error`, `settings`, `profile` | [`Scene`]: files or vertices, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |

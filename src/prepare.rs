@@ -130,8 +130,16 @@ pub const MAX_SIDE: u32 = 65_536;
 
 /// Checks the settings against the scene and fills the shared structs.
 ///
-/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions, projection or environment cannot be had.
+/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions, projection or environment cannot be had, and
+/// for materials, lights or cameras that a caller put into the scene and that are none.
 pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
+    prepare_again(scene, settings, &[])
+}
+
+/// As [`prepare`], where the models of materials stay as they were chosen before, unless settings or materials ask for
+/// one.
+pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: &[Option<Advice>]) -> Result<Prepared> {
+    scene::check_scene(scene)?;
     let (width, height) = resolution(scene, settings)?;
     let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, width, height]);
     if x0 >= x1 || y0 >= y1 || x1 > width || y1 > height {
@@ -153,7 +161,9 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     let frame = scene.frame;
     let camera = scene.camera(&settings.camera, f64::from(width) / f64::from(height))?;
     let details = Detail::of(scene, &camera, height);
-    let advice: Vec<_> = scene.materials.iter().zip(details).map(|(m, d)| model::advise(settings, m, d)).collect();
+    let made = |index: usize| Some(&before.get(index)?.as_ref()?.choice);
+    let advice = |(index, (material, detail))| model::advise(settings, material, detail, made(index));
+    let advice: Vec<_> = scene.materials.iter().zip(details).enumerate().map(advice).collect();
     let thickness = sets::thickness(scene, settings, &advice);
     let (mut profiles, mut boundaries) = (vec![], boundaries(scene, settings));
     let mut materials = materials(scene, settings, &advice, &thickness, &mut profiles, &mut boundaries)?;
@@ -372,32 +382,25 @@ pub(crate) fn replaced(
     old: &scene::Material,
     new: &scene::Material,
 ) -> Result<Material> {
-    let refuse = |problem: &str| Err(Error::setting(format!("material `{}`", new.name), problem.to_string()));
+    let refuse = |problem: &str| {
+        Err(Error::setting(format!("material `{}`", new.name), format!("{problem}: update the scene instead")))
+    };
     let of = |m: &scene::Material| (m.medium.is_some(), m.two_sided, m.hidden, m.tinted, m.set.clone(), m.emission);
-    let unit = |v: DVec3| v.is_finite() && v.min_element() >= 0.0 && v.max_element() <= 1.0;
-    let numbers = new.medium.as_ref().is_none_or(|m| {
-        let positive = |v: DVec3| v.is_finite() && v.min_element() >= 0.0;
-        positive(m.sigma_s_prime) && positive(m.sigma_a) && m.g.is_finite() && m.g.abs().max_element() < 1.0
-    });
-    let fraction = |x: f64| (0.0..=1.0).contains(&x);
-    let surface = unit(new.base_color) && fraction(new.metallic) && fraction(new.roughness);
-    if !(numbers && surface && (0.1..=10.0).contains(&new.ior)) {
-        return refuse("a number is out of its range");
-    }
+    scene::check_material(new)?;
     let choice = prepared.advice[index].as_ref().map(|advice| advice.choice.clone());
     let translucent = new.medium.is_some();
     if of(old) != of(new) || old.textures != new.textures || !old.ramp.is_empty() {
-        return refuse("another kind of matter, emission, texture or set needs a new renderer");
+        return refuse("another kind of matter, emission, texture or set is more than one material's numbers");
     }
     if choice.as_ref().is_some_and(|choice| choice.limit_of == Model::Table) {
-        return refuse("the table model's profile is simulated for its matter; another needs a new renderer");
+        return refuse("the table model's profile is made for its matter");
     }
     if translucent && prepared.features.mixtures != 0 {
-        return refuse("another medium where sets hold several materials needs a new renderer");
+        return refuse("its medium is one of several that exchange light");
     }
     let same_boundary = old.roughness == new.roughness && (old.ior == new.ior || old.roughness == 0.0);
     if translucent && !same_boundary || (old.roughness > 0.0) != (new.roughness > 0.0) {
-        return refuse("another rough boundary needs a new renderer");
+        return refuse("another rough boundary needs another table");
     }
     let mut boundaries = Boundaries::new(false, settings.normalisation);
     let common = Common { frame, settings, thickness: &[], mixed: false };
@@ -406,7 +409,7 @@ pub(crate) fn replaced(
     let before = &prepared.materials[index];
     made.boundary = before.boundary;
     if made.scattering != Vec3::ZERO && !prepared.has_single {
-        return refuse("light scattered once needs a new renderer");
+        return refuse("light scattered once needs a kernel that is not there");
     }
     Ok(made)
 }

@@ -50,7 +50,7 @@ impl Matter {
             return Err(Error::setting("matter", "must scatter in every channel to be measured"));
         }
         let settings = Settings { model, ..Settings::default() };
-        let model = model::advise(&settings, &read, Detail::ALL).expect("it has a medium").choice.model;
+        let model = model::advise(&settings, &read, Detail::ALL, None).expect("it has a medium").choice.model;
         if model == Model::Lambert {
             return Err(Error::setting("model", "the opaque limit has no profile that could be measured"));
         }

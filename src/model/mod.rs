@@ -64,8 +64,9 @@ pub struct Advice {
     pub warnings: Vec<String>,
 }
 
-/// The model of a material that shows this much of it; none for an opaque one.
-pub fn advise(settings: &Settings, material: &Material, detail: Detail) -> Option<Advice> {
+/// The model of a material that shows this much of it; none for an opaque one. Where neither settings nor file ask for
+/// one, a choice that was `made` before stays.
+pub fn advise(settings: &Settings, material: &Material, detail: Detail, made: Option<&Choice>) -> Option<Advice> {
     let medium = material.medium.as_ref()?;
     let channels: Vec<Coefficients> = (0..3).map(|c| Coefficients::of(medium, material.ior, c)).collect();
     let recommended = recommend(&channels, detail);
@@ -76,6 +77,7 @@ pub fn advise(settings: &Settings, material: &Material, detail: Detail) -> Optio
     };
     let choice = asked(Some(settings.model), "as the settings ask")
         .or_else(|| asked(medium.model, "as the file asks"))
+        .or_else(|| made.cloned())
         .unwrap_or_else(|| recommended.clone());
     let error = worst(&channels, choice.limit_of, |error| error.l1).map(|error| match choice.model {
         // All light is where it entered, which does not show, or is all in the wrong place.

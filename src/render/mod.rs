@@ -85,8 +85,9 @@ pub struct Progress {
 pub struct Renderer {
     device: Device,
     frame: Frame,
-    /// [`Scene::hash`].
+    /// [`Scene::hash`], as the scene is now.
     scene_hash: String,
+    geometry: scene::Geometry,
     /// The scene's materials as authored.
     authored: Vec<scene::Material>,
     settings: Settings,
@@ -109,6 +110,8 @@ pub struct Renderer {
     kept_at: Instant,
     /// Where sums are copied to before they take the place of older ones.
     spare: [Vec<u8>; 2],
+    /// Writing failed midway: the buffers are of two scenes.
+    torn: bool,
 }
 
 impl Renderer {
@@ -121,7 +124,8 @@ impl Renderer {
 
     /// As [`Renderer::new`], with buffers of the caller's in place of our own: geometry, results, or any slot but
     /// `Progresses`, as [`Plan`] lists them. Elements are laid out as [`crate::shared`] says, without padding. What the
-    /// scene determines is written to them here: the BVH and the order of its triangles are made on the host.
+    /// scene determines is written to them here: the BVH and the order of its triangles are made on the host. Vertices
+    /// that only a buffer of the caller's holds are read back by him, once, for [`Scene::from_meshes`].
     ///
     /// # Errors
     /// As [`Renderer::new`]; [`Error::Setting`] for a buffer that is too small, and for one that has to be filled on a
@@ -186,6 +190,8 @@ impl Renderer {
             };
             Err(Error::setting(format!("the caller's buffer {}", slot.name()), problem))
         };
+        let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
+        let sizes = plan::sizes(scene, &prepared, pixels);
         let mut buffers = Vec::new();
         for (slot, data) in scene_data(scene, &prepared) {
             let limit = device.max_storage_buffer_range();
@@ -197,12 +203,12 @@ impl Renderer {
                 );
                 return Err(Error::Memory { step: format!("create buffer {}", slot.name()), problem });
             }
-            let buffer = take(slot, data.len() as u64, Location::Device)?;
+            let (_, bytes) = sizes.iter().find(|(sized, _)| *sized == slot).expect("every slot has a size");
+            let buffer = take(slot, *bytes, Location::Device)?;
             upload(device, &buffer, data)?;
             buffers.push((slot, buffer));
         }
-        let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
-        for (slot, bytes) in plan::sizes(scene, &prepared, pixels) {
+        for (slot, bytes) in sizes {
             if buffers.iter().all(|(made, _)| *made != slot) {
                 buffers.push((slot, take(slot, bytes, Location::Scratch)?));
             }
@@ -223,10 +229,12 @@ impl Renderer {
             (true, None) => Some(Recorder::new(device)?),
             (true, Some(_)) => Some(Recorder::profiled(device)?),
         };
+        let geometry = scene::geometry(scene);
         Ok(Renderer {
             device: device.clone(),
             frame: scene.frame,
-            scene_hash: scene.hash.clone(),
+            scene_hash: scene::hash(scene, geometry),
+            geometry,
             authored: scene.materials.clone(),
             settings: settings.clone(),
             prepared,
@@ -243,6 +251,7 @@ impl Renderer {
             keep_every: None,
             kept_at: Instant::now(),
             spare: Default::default(),
+            torn: false,
         })
     }
 
@@ -473,11 +482,20 @@ fn count(buffers: &[(Slot, Buffer)]) -> Option<Count> {
 /// The buffers that only a scene and its settings determine, as bytes. A scene without lights or environment has none
 /// of theirs.
 fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u8])> {
-    [
-        (Slot::Views, bytemuck::bytes_of(&prepared.view)),
+    let geometry: [(Slot, &[u8]); 4] = [
         (Slot::Nodes, bytemuck::cast_slice(&scene.nodes)),
         (Slot::Triangles, bytemuck::cast_slice(&scene.triangles)),
         (Slot::Shadings, bytemuck::cast_slice(&scene.shadings)),
+        (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
+    ];
+    let geometry = geometry.into_iter().filter(|(_, data)| !data.is_empty());
+    geometry.chain(prepared_data(prepared)).collect()
+}
+
+/// Those that do not hold geometry: what may change while it stays.
+fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
+    [
+        (Slot::Views, bytemuck::bytes_of(&prepared.view)),
         (Slot::Materials, bytemuck::cast_slice(&prepared.materials)),
         (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
         (Slot::Emitters, bytemuck::cast_slice(&prepared.emitters)),
@@ -487,7 +505,6 @@ fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u
         (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
         (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),
         (Slot::Textures, bytemuck::cast_slice(&prepared.textures)),
-        (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
         (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
         (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
         (Slot::Balances, bytemuck::cast_slice(&prepared.balances)),

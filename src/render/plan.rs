@@ -6,8 +6,9 @@ use crate::{
     gpu::Device,
     prepare::{Prepared, prepare},
     scene::Scene,
-    settings::Settings,
-    shared::{self, MAX_RECORDED, Slot},
+    settings::{Model, Settings},
+    shared::{self, BOUNDARY_ROW, MAX_RECORDED, Slot, TABLE_NODES},
+    table::block::{Block, MOST_CELLS},
 };
 
 /// What a device allows.
@@ -143,7 +144,8 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
 
 /// Bytes of each buffer that a renderer makes, for a band of `pixels`.
 pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slot, u64)> {
-    let of_scene = super::scene_data(scene, prepared).into_iter().map(|(slot, data)| (slot, data.len() as u64));
+    let of_scene = super::scene_data(scene, prepared).into_iter();
+    let of_scene = of_scene.map(|(slot, data)| (slot, room(prepared, slot).max(data.len() as u64)));
     let of_band =
         bands::slots(prepared).into_iter().map(|slot| (slot, bands::bytes_per_pixel(slot) * u64::from(pixels)));
     let counters = (prepared.features.counters != 0).then_some((Slot::Counters, 4));
@@ -151,6 +153,26 @@ pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slo
     let recorded = recorded.into_iter().filter(|_| prepared.features.recorded != 0);
     let recorded = recorded.map(|(slot, elements)| (slot, u64::from(elements) * slot.stride() as u64));
     of_scene.chain(of_band).chain(counters).chain(recorded).collect()
+}
+
+/// Bytes that a buffer of a renderer that records may come to need when matter changes ([`Renderer::update`]): as many as
+/// there are for tables of any matter, 482 kB for each material (12 kB where profiles do not depend on curvatures), and a
+/// rough boundary of each translucent material's own.
+///
+/// [`Renderer::update`]: super::Renderer::update
+fn room(prepared: &Prepared, slot: Slot) -> u64 {
+    let choices = || prepared.advice.iter().flatten().map(|advice| &advice.choice);
+    let each = match slot {
+        _ if prepared.features.recorded == 0 => 0,
+        Slot::Profiles => {
+            let tables = choices().filter(|choice| choice.model == Model::Table).count();
+            let nodes = if prepared.features.curvature == 0 { 1 } else { TABLE_NODES as usize };
+            tables * nodes * Block::stride(MOST_CELLS)
+        }
+        Slot::Boundaries => choices().count() * (prepared.features.rough * BOUNDARY_ROW) as usize,
+        _ => 0,
+    };
+    (each * slot.stride()) as u64
 }
 
 /// Why a slot has no buffer.

@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Result},
     gpu::{Device, download_to, upload},
     profile,
-    scene::Scene,
+    scene::{self, Scene},
     shared::{BATCHES, Slot},
 };
 use std::{
@@ -114,7 +114,7 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::new`]; [`Error::Setting`] for a scene that is not the one it was made of.
     pub fn resume(self, device: &Device, scene: &Scene) -> Result<Renderer> {
-        if scene.hash != self.scene_hash {
+        if scene::hash(scene, scene::geometry(scene)) != self.scene_hash {
             return Err(Error::setting("scene", "is not the one that was rendered"));
         }
         let Renderer { kernels, bindings, recorder, buffers, device: lost, .. } = self;

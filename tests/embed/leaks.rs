@@ -96,7 +96,7 @@ macro_rules! counted {
         }
 
         /// Objects that were made so far, by kind.
-        fn made() -> Vec<(&'static str, usize)> {
+        pub fn made() -> Vec<(&'static str, usize)> {
             vec![$((stringify!($kind), $kind::MADE.load(Relaxed)),)*]
         }
 

@@ -8,3 +8,4 @@ mod faults;
 mod leaks;
 mod names;
 mod record;
+mod update;

@@ -32,14 +32,14 @@ fn rendered(scene: &Scene, samples: std::ops::Range<u32>) -> Image {
 
 /// Fails unless both have the same channels, bit for bit.
 #[track_caller]
-fn same(one: &Image, two: &Image) {
+pub fn same(one: &Image, two: &Image) {
     for (a, b) in one.channels.iter().zip(&two.channels) {
         assert!(a.name == b.name && a.data == b.data, "channel {}", a.name);
     }
     assert_eq!(one.channels.len(), two.channels.len());
 }
 
-fn record(app: &App, renderer: &Renderer, samples: std::ops::Range<u32>) -> vk::CommandBuffer {
+pub fn record(app: &App, renderer: &Renderer, samples: std::ops::Range<u32>) -> vk::CommandBuffer {
     app.commands(|commands| unsafe { renderer.record(commands, samples).expect("it can be recorded") })
 }
 
