@@ -33,17 +33,18 @@ fn assert_same(a: &Image, b: &Image, what: &str) {
 
 #[test]
 fn two_runs_bands_portions_and_workgroups_give_the_same_bits() {
-    let whole = image(&settings(), &[3..43]);
+    let whole = image(&settings(), &[3..27]);
     assert!(channel(&whole, "subsurface.R").iter().any(|x| *x > 0.0));
-    assert_same(&whole, &image(&settings(), &[3..43]), "a second run");
-    for band_pixels in [60, 500, 1] {
+    assert_same(&whole, &image(&settings(), &[3..27]), "a second run");
+    // One row, and some.
+    for band_pixels in [1, 500] {
         let settings = Settings { band_pixels: Some(band_pixels), ..settings() };
-        assert_same(&whole, &image(&settings, &[3..43]), &format!("bands of {band_pixels} pixels"));
+        assert_same(&whole, &image(&settings, &[3..27]), &format!("bands of {band_pixels} pixels"));
     }
-    assert_same(&whole, &image(&settings(), &[3..4, 4..20, 20..43]), "in portions");
-    for workgroup in [1, 32, 128] {
+    assert_same(&whole, &image(&settings(), &[3..4, 4..20, 20..27]), "in portions");
+    for workgroup in [1, 128] {
         let settings = Settings { workgroup, ..settings() };
-        assert_same(&whole, &image(&settings, &[3..43]), &format!("workgroups of {workgroup}"));
+        assert_same(&whole, &image(&settings, &[3..27]), &format!("workgroups of {workgroup}"));
     }
 }
 
