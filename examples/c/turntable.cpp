@@ -155,8 +155,16 @@ void run(const std::vector<std::string> &arguments) {
     tl(translucent_renderer_record(renderer, commands, 0, samples, &times), "record");
     vk(vkEndCommandBuffer(commands), "vkEndCommandBuffer");
 
-    // The same command buffer for every frame; only the camera's numbers change.
+    // The same command buffer for every frame; only the camera's numbers change, and halfway the matter.
     for (std::uint32_t frame = 0; frame < frames; frame++) {
+        if (frame > 0 && frame == frames / 2) {
+            TranslucentMaterial marble{};
+            marble.struct_size = sizeof marble;
+            marble.preset = "marble";
+            marble.roughness = 0.3;
+            tl(translucent_scene_set_material(scene, 0, &marble), "marble");
+            tl(translucent_renderer_update(renderer, scene), "update");
+        }
         const double angle = 6.283185307179586 * frame / frames, distance = 0.35;
         TranslucentCamera camera{};
         camera.struct_size = sizeof camera;

@@ -8,8 +8,10 @@
 #![allow(clippy::missing_safety_doc, non_camel_case_types, non_upper_case_globals)]
 
 pub mod device;
+pub mod meshes;
 pub mod renderer;
 pub mod scene;
+pub mod update;
 
 use engine::{Error, ash::vk};
 use std::{

@@ -10,10 +10,8 @@ use engine::{
     ash::vk::{self, Handle},
     gpu::{Buffer, Timestamps},
     render::{Limits, Plan},
-    scene::{Camera, Lens, Light, LightKind},
     shared::Slot,
 };
-use glam::DVec3;
 use std::ffi::{CString, c_char};
 
 /// Everything about a render that is not the scene. translucent_settings_default fills it in.
@@ -145,7 +143,7 @@ pub unsafe extern "C" fn translucent_buffer_size(
 /// Renders one scene with one set of settings. It may move to another thread, and be used by one at a time; several may
 /// be used at once.
 pub struct TranslucentRenderer {
-    renderer: Renderer,
+    pub(crate) renderer: Renderer,
     /// Names of the kernels, for translucent_renderer_timestamp_name.
     names: Vec<(&'static str, CString)>,
 }
@@ -330,162 +328,6 @@ pub unsafe extern "C" fn translucent_renderer_output(
             };
         }
         Ok(())
-    })
-}
-
-/// From which sample the ranges of recordings count. No execution may be going on, here and in the functions below.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn translucent_renderer_set_first_sample(
-    renderer: *mut TranslucentRenderer,
-    first: u32,
-) -> TranslucentResult {
-    guard(|| {
-        // SAFETY: the caller's pointer, as the header says.
-        Ok(unsafe { exclusive(renderer, "renderer")? }.renderer.set_first_sample(first)?)
-    })
-}
-
-/// A camera; lengths in metres.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct TranslucentCamera {
-    /// sizeof(TranslucentCamera).
-    pub struct_size: usize,
-    pub eye: [f64; 3],
-    /// Where it looks, of any length but 0.
-    pub forward: [f64; 3],
-    /// What is up in the image; not parallel to forward.
-    pub up: [f64; 3],
-    /// Full vertical angle (radians); 0: orthographic.
-    pub yfov: f64,
-    /// Orthographic: half width and half height.
-    pub xmag: f64,
-    pub ymag: f64,
-}
-
-/// Looks through another camera. Sums are forgotten.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn translucent_renderer_set_camera(
-    renderer: *mut TranslucentRenderer,
-    camera: *const TranslucentCamera,
-) -> TranslucentResult {
-    guard(|| {
-        // SAFETY: the caller's pointers, as the header says.
-        let (renderer, given) = unsafe { (exclusive(renderer, "renderer")?, read(camera, "camera")?) };
-        let forward = DVec3::from(given.forward).normalize_or_zero();
-        let right = forward.cross(given.up.into()).normalize_or_zero();
-        let lens = match given.yfov {
-            0.0 => Lens::Orthographic { xmag: given.xmag, ymag: given.ymag },
-            yfov => Lens::Perspective { yfov, aspect: None },
-        };
-        let eye = given.eye.into();
-        let up = right.cross(forward);
-        let camera = Camera { name: "caller's".into(), object_name: None, eye, right, up, forward, lens };
-        Ok(renderer.renderer.set_camera(&camera)?)
-    })
-}
-
-/// Kind of a light.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TranslucentLightKind {
-    /// intensity is W/sr.
-    Point = 0,
-    /// As a point light, within a cone.
-    Spot = 1,
-    /// intensity is W/m^2 on a plane across the direction.
-    Directional = 2,
-}
-
-/// A light; lengths in metres.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct TranslucentLight {
-    /// sizeof(TranslucentLight).
-    pub struct_size: usize,
-    /// A TranslucentLightKind.
-    pub kind: u32,
-    /// Point and spot.
-    pub position: [f64; 3],
-    /// Spot and directional: where it shines, of any length but 0.
-    pub direction: [f64; 3],
-    pub intensity: [f64; 3],
-    /// Spot: angles from the axis (radians), 0 <= inner < outer <= pi/2.
-    pub inner: f64,
-    pub outer: f64,
-    /// How far it reaches, as KHR_lights_punctual has it; 0: infinitely far.
-    pub range: f64,
-}
-
-/// Replaces the scene's lights by as many others; one that is switched off has the intensity 0. Sums are forgotten.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn translucent_renderer_set_lights(
-    renderer: *mut TranslucentRenderer,
-    lights: *const TranslucentLight,
-    count: u32,
-) -> TranslucentResult {
-    guard(|| {
-        // SAFETY: the caller's pointers, as the header says.
-        let (renderer, given) = unsafe { (exclusive(renderer, "renderer")?, slice(lights, count as usize, "lights")?) };
-        let light = |given: &TranslucentLight| {
-            // SAFETY: an element of the caller's array.
-            let given = unsafe { read(given, "light") }?;
-            let direction = DVec3::from(given.direction).normalize_or_zero();
-            let (kind, direction) = match given.kind {
-                k if k == TranslucentLightKind::Point as u32 => (LightKind::Point, DVec3::NEG_Z),
-                k if k == TranslucentLightKind::Spot as u32 => {
-                    (LightKind::Spot { inner: given.inner, outer: given.outer }, direction)
-                }
-                k if k == TranslucentLightKind::Directional as u32 => (LightKind::Directional, direction),
-                k => return Err(argument(format!("{k} is no TranslucentLightKind"))),
-            };
-            Ok(Light {
-                name: "caller's".into(),
-                position: given.position.into(),
-                direction,
-                intensity: given.intensity.into(),
-                kind,
-                range: Some(given.range).filter(|range| *range != 0.0),
-            })
-        };
-        let lights = given.iter().map(light).collect::<Result<Vec<_>, Failure>>()?;
-        Ok(renderer.renderer.set_lights(&lights)?)
-    })
-}
-
-/// What fills a translucent material.
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct TranslucentMatter {
-    /// sizeof(TranslucentMatter).
-    pub struct_size: usize,
-    /// Reduced scattering coefficient of red, green and blue [1/m].
-    pub sigma_s_prime: [f64; 3],
-    /// Absorption coefficient [1/m].
-    pub sigma_a: [f64; 3],
-    /// Index of refraction.
-    pub ior: f64,
-}
-
-/// Gives a translucent material other matter, under the model that it has. Sums are forgotten.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn translucent_renderer_set_matter(
-    renderer: *mut TranslucentRenderer,
-    material: u32,
-    matter: *const TranslucentMatter,
-) -> TranslucentResult {
-    guard(|| {
-        // SAFETY: the caller's pointers, as the header says.
-        let (renderer, given) = unsafe { (exclusive(renderer, "renderer")?, read(matter, "matter")?) };
-        let index = material as usize;
-        let old = renderer.renderer.material(index);
-        let mut new = old.cloned().ok_or_else(|| argument(format!("the scene has no material {material}")))?;
-        let medium = new.medium.as_mut().ok_or_else(|| argument(format!("material {material} is opaque")))?;
-        medium.sigma_s_prime = given.sigma_s_prime.into();
-        medium.sigma_a = given.sigma_a.into();
-        medium.appearance = None;
-        new.ior = given.ior;
-        Ok(renderer.renderer.set_material(index, &new)?)
     })
 }
 

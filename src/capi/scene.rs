@@ -1,7 +1,10 @@
 //! Scenes: glTF files, on disk or in memory.
 
 use crate::{Failure, TranslucentResult, argument, create, destroy, exclusive, guard, read, reference, slice, text};
-use engine::{Environment, LoadOptions, Scene, scene::EnvironmentMap};
+use engine::{
+    Environment, LoadOptions, Scene,
+    scene::{EnvironmentMap, Material},
+};
 use glam::DVec3;
 use std::ffi::{CString, c_char, c_void};
 
@@ -50,9 +53,15 @@ unsafe fn load(info: *const TranslucentSceneInfo) -> Result<TranslucentScene, Fa
         // SAFETY: as above.
         Scene::from_bytes(file, unsafe { slice(info.data.cast(), info.size, "info.data") }?, &options)?
     };
-    let name = |material: &engine::scene::Material| CString::new(material.name.replace('\0', " ")).unwrap_or_default();
-    let names = scene.materials.iter().map(name).collect();
-    Ok(TranslucentScene { scene, names })
+    Ok(TranslucentScene::of(scene))
+}
+
+impl TranslucentScene {
+    pub(crate) fn of(scene: Scene) -> TranslucentScene {
+        let name = |material: &Material| CString::new(material.name.replace('\0', " ")).unwrap_or_default();
+        let names = scene.materials.iter().map(name).collect();
+        TranslucentScene { scene, names }
+    }
 }
 
 /// Lights the scene with the same radiance (R, G, B) from everywhere.

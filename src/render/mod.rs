@@ -193,7 +193,7 @@ impl Renderer {
         let pixels = bands.iter().map(|band| band.pixels).max().unwrap_or(0);
         let sizes = plan::sizes(scene, &prepared, pixels);
         let mut buffers = Vec::new();
-        for (slot, data) in scene_data(scene, &prepared) {
+        for (slot, data) in plan::scene_data(scene, &prepared) {
             let limit = device.max_storage_buffer_range();
             if data.len() as u64 > limit {
                 let (count, most) = (data.len() / slot.stride(), limit / slot.stride() as u64);
@@ -477,42 +477,6 @@ fn find(buffers: &[(Slot, Buffer)], slot: Slot) -> Option<&Buffer> {
 /// Which samples the sums hold, where recordings keep count of them.
 fn count(buffers: &[(Slot, Buffer)]) -> Option<Count> {
     find(buffers, Slot::Progresses).map(|counts| counts.read()[0])
-}
-
-/// The buffers that only a scene and its settings determine, as bytes. A scene without lights or environment has none
-/// of theirs.
-fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u8])> {
-    let geometry: [(Slot, &[u8]); 4] = [
-        (Slot::Nodes, bytemuck::cast_slice(&scene.nodes)),
-        (Slot::Triangles, bytemuck::cast_slice(&scene.triangles)),
-        (Slot::Shadings, bytemuck::cast_slice(&scene.shadings)),
-        (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
-    ];
-    let geometry = geometry.into_iter().filter(|(_, data)| !data.is_empty());
-    geometry.chain(prepared_data(prepared)).collect()
-}
-
-/// Those that do not hold geometry: what may change while it stays.
-fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
-    [
-        (Slot::Views, bytemuck::bytes_of(&prepared.view)),
-        (Slot::Materials, bytemuck::cast_slice(&prepared.materials)),
-        (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
-        (Slot::Emitters, bytemuck::cast_slice(&prepared.emitters)),
-        (Slot::EmitterCdf, bytemuck::cast_slice(&prepared.emitter_cdf)),
-        (Slot::Boundaries, bytemuck::cast_slice(&prepared.boundaries)),
-        (Slot::Environment, bytemuck::cast_slice(&prepared.environment)),
-        (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
-        (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),
-        (Slot::Textures, bytemuck::cast_slice(&prepared.textures)),
-        (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
-        (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
-        (Slot::Balances, bytemuck::cast_slice(&prepared.balances)),
-        (Slot::Mixtures, bytemuck::cast_slice(&prepared.mixtures)),
-    ]
-    .into_iter()
-    .filter(|(_, data)| !data.is_empty())
-    .collect()
 }
 
 /// Hex SHA-256 over the SPIR-V of all kernels.

@@ -142,9 +142,45 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
     }
 }
 
+/// The buffers that only a scene and its settings determine, as bytes. A scene without lights or environment has none
+/// of theirs.
+pub(super) fn scene_data<'a>(scene: &'a Scene, prepared: &'a Prepared) -> Vec<(Slot, &'a [u8])> {
+    let geometry: [(Slot, &[u8]); 4] = [
+        (Slot::Nodes, bytemuck::cast_slice(&scene.nodes)),
+        (Slot::Triangles, bytemuck::cast_slice(&scene.triangles)),
+        (Slot::Shadings, bytemuck::cast_slice(&scene.shadings)),
+        (Slot::Coordinates, bytemuck::cast_slice(&scene.coordinates)),
+    ];
+    let geometry = geometry.into_iter().filter(|(_, data)| !data.is_empty());
+    geometry.chain(prepared_data(prepared)).collect()
+}
+
+/// Those that do not hold geometry: what may change while it stays.
+pub(super) fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
+    [
+        (Slot::Views, bytemuck::bytes_of(&prepared.view)),
+        (Slot::Materials, bytemuck::cast_slice(&prepared.materials)),
+        (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
+        (Slot::Emitters, bytemuck::cast_slice(&prepared.emitters)),
+        (Slot::EmitterCdf, bytemuck::cast_slice(&prepared.emitter_cdf)),
+        (Slot::Boundaries, bytemuck::cast_slice(&prepared.boundaries)),
+        (Slot::Environment, bytemuck::cast_slice(&prepared.environment)),
+        (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
+        (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),
+        (Slot::Textures, bytemuck::cast_slice(&prepared.textures)),
+        (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
+        (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
+        (Slot::Balances, bytemuck::cast_slice(&prepared.balances)),
+        (Slot::Mixtures, bytemuck::cast_slice(&prepared.mixtures)),
+    ]
+    .into_iter()
+    .filter(|(_, data)| !data.is_empty())
+    .collect()
+}
+
 /// Bytes of each buffer that a renderer makes, for a band of `pixels`.
 pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slot, u64)> {
-    let of_scene = super::scene_data(scene, prepared).into_iter();
+    let of_scene = scene_data(scene, prepared).into_iter();
     let of_scene = of_scene.map(|(slot, data)| (slot, room(prepared, slot).max(data.len() as u64)));
     let of_band =
         bands::slots(prepared).into_iter().map(|slot| (slot, bands::bytes_per_pixel(slot) * u64::from(pixels)));

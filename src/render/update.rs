@@ -1,6 +1,9 @@
 //! What may change between recordings without a new renderer: written into buffers that stay.
 
-use super::{Renderer, SPIRV, plan, prepared_data};
+use super::{
+    Renderer, SPIRV,
+    plan::{self, prepared_data},
+};
 use crate::{
     error::{Error, Result},
     gpu::upload,
@@ -44,8 +47,7 @@ impl Renderer {
             let (new, old) = (scene.materials.len(), self.authored.len());
             return refuse("materials", format!("{new} in place of {old}"));
         }
-        let kind = |m: &scene::Material| (m.medium.is_some(), m.hidden, m.set.clone());
-        if let Some((_, new)) = self.authored.iter().zip(&scene.materials).find(|(old, new)| kind(old) != kind(new)) {
+        if let Some((_, new)) = self.authored.iter().zip(&scene.materials).find(|(old, new)| old.kind() != new.kind()) {
             return refuse(format!("material `{}`", new.name), "its kind of matter or set decides on the geometry");
         }
         let mut new = prepare_again(scene, &self.settings, &self.prepared.advice)?;

@@ -150,3 +150,63 @@ pub(crate) fn check_scene(scene: &Scene) -> Result<()> {
     }
     Ok(())
 }
+
+/// What a caller puts into a scene, checked at once where the fields themselves are checked when a renderer is made.
+/// Brings [`Scene::hash`] up to date.
+impl Scene {
+    /// Replaces the lights.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a light with numbers that are not finite, a negative intensity, no direction, a cone that is
+    /// none, or that is too far away or too bright. Nothing was changed then.
+    pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<()> {
+        lights.iter().try_for_each(|light| check_light(light, &self.frame))?;
+        self.lights = lights;
+        self.rehash();
+        Ok(())
+    }
+
+    /// Replaces the cameras; without any, one frames the scene.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that is no rotation, has no angle of view or is too far away. Nothing was changed
+    /// then.
+    pub fn set_cameras(&mut self, cameras: Vec<Camera>) -> Result<()> {
+        cameras.iter().try_for_each(|camera| check_camera(camera, &self.frame))?;
+        self.cameras = cameras;
+        self.rehash();
+        Ok(())
+    }
+
+    /// Replaces the material number `index`. Whether it is translucent, hidden or names a set decided on the geometry, and
+    /// stays.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an index that there is not, another kind of material, numbers out of their ranges, pictures
+    /// or coordinates that the scene does not have, another index of refraction than that of its set. Nothing was changed
+    /// then.
+    pub fn set_material(&mut self, index: usize, material: Material) -> Result<()> {
+        let count = self.materials.len();
+        let Some(place) = self.materials.get_mut(index) else {
+            return Err(Error::setting("material", format!("there are {count}, none has the index {index}")));
+        };
+        if place.kind() != material.kind() {
+            let problem = "whether it is translucent, hidden or names a set stays as it was when the scene was made";
+            return Err(Error::setting(format!("material `{}`", material.name), problem));
+        }
+        let old = std::mem::replace(place, material);
+        if let Err(error) = check_scene(self) {
+            self.materials[index] = old;
+            return Err(error);
+        }
+        self.rehash();
+        Ok(())
+    }
+}
+
+impl Material {
+    /// What decides on sets, winding and frame.
+    pub(crate) fn kind(&self) -> (bool, bool, Option<&str>) {
+        (self.medium.is_some(), self.hidden, self.set.as_deref())
+    }
+}

@@ -186,7 +186,7 @@ impl Scene {
             dropped_triangles: dropped + too_small,
             hash: String::new(),
         };
-        scene.hash = hash(&scene, geometry(&scene));
+        scene.rehash();
         Ok(scene)
     }
 
@@ -206,8 +206,12 @@ impl Scene {
             self.warnings.push(format!("{ENVIRONMENT_WARNING}{raised} texels of negative radiance are taken as 0"));
         }
         self.environment = environment;
-        self.hash = hash(self, geometry(self));
+        self.rehash();
         Ok(())
+    }
+
+    fn rehash(&mut self) {
+        self.hash = hash(self, geometry(self));
     }
 }
 

@@ -1,12 +1,17 @@
 //! The C interface: its header, its libraries as a user installs them, and the examples.
 
+use glam::DVec3;
 use std::{
+    f64::consts::PI,
     fs,
     path::{Path, PathBuf},
     process::Command,
     sync::Once,
 };
-use translucent::{Environment, Image, Model, Renderer, Scene, Settings};
+use translucent::{
+    Environment, Image, Model, Renderer, Scene, Settings,
+    scene::{Camera, Lens, Material},
+};
 
 const HEADER: &str = "src/capi/include/translucent.h";
 
@@ -165,6 +170,22 @@ fn the_example_in_cpp_turns_the_camera_with_the_static_library() {
     assert!(times.contains("accumulate ") && times.contains("resolve "), "{times}");
     let frames = [0, 1].map(|number| Image::read(prefix.join(format!("frame{number}.exr"))).expect("it was written"));
     assert!(frames[0].channel("R") != frames[1].channel("R"));
+    // The second from behind, in marble: as a renderer that was made for it has it.
+    let mut scene = Scene::load("assets/spot.glb").expect("the asset");
+    scene.set_environment(Environment::constant(DVec3::ONE).expect("a radiance")).expect("an environment");
+    let marble = Material { roughness: 0.3, base_color: DVec3::ZERO, ..Material::from_preset("marble").expect("one") };
+    scene.set_material(0, marble).expect("translucent, too");
+    let lens = Lens::Perspective { yfov: 0.6, aspect: None };
+    let eye = 0.35 * DVec3::new(PI.sin(), 0.0, PI.cos());
+    scene.set_cameras(vec![Camera::new("behind", eye, -eye, DVec3::Y, lens)]).expect("a camera");
+    let settings = Settings { resolution: Some((SIZE, SIZE)), model: Model::Burley, ..Settings::default() };
+    let device = translucent::Device::open(&Default::default()).expect("a device");
+    let mut renderer = Renderer::new(&device, &scene, &settings).expect("a renderer");
+    renderer.render(8).expect("a render");
+    let expected = renderer.image().expect("an image");
+    for name in ["R", "G", "B"] {
+        assert!(frames[1].channel(name).is_some() && frames[1].channel(name) == expected.channel(name), "{name}");
+    }
     for frame in frames {
         assert!(frame.channel("A").is_some_and(|alpha| alpha.iter().sum::<f32>() > 10.0));
         assert_eq!(frame.channel("samples.Y").map(|samples| samples[0]), Some(8.0));

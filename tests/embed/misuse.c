@@ -53,6 +53,50 @@ int main(void) {
     if (translucent_scene_material_name(scene, 0, &name) != TRANSLUCENT_RESULT_OK || !*name) return 1;
     expect(translucent_scene_material_name(scene, count, &name), ARGUMENT, "no material");
 
+    TranslucentCamera camera = {.struct_size = sizeof camera, .yfov = 1};
+    expect(translucent_scene_set_camera(scene, &camera), TRANSLUCENT_RESULT_INPUT, "camera `caller's`");
+    TranslucentLight light = {.struct_size = sizeof light, .intensity = {-1, 0, 0}};
+    expect(translucent_scene_set_lights(scene, &light, 1), TRANSLUCENT_RESULT_INPUT, "light `caller's`");
+    TranslucentMaterial material = {.struct_size = sizeof material, .preset = "marbel"};
+    expect(translucent_scene_set_material(scene, 0, &material), TRANSLUCENT_RESULT_INPUT, "close names: marble");
+    TranslucentMatter matter = {.struct_size = sizeof matter, .ior = 1.4};
+    material.matter = &matter;
+    expect(translucent_scene_set_material(scene, 0, &material), ARGUMENT, "do not go together");
+    material.preset = NULL;
+    expect(translucent_scene_set_material(scene, 9, &material), TRANSLUCENT_RESULT_INPUT, "none has the index 9");
+    if (translucent_scene_set_material(scene, 0, &material) != TRANSLUCENT_RESULT_OK) return 1;
+    material.model = "clay";
+    expect(translucent_scene_set_material(scene, 0, &material), ARGUMENT, "unknown model");
+    material.matter = NULL;
+    expect(translucent_scene_set_material(scene, 0, &material), TRANSLUCENT_RESULT_INPUT, "whether it is translucent");
+
+    float corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    uint32_t faces[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 4};
+    double projection[16] = {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    TranslucentMesh mesh = {.struct_size = sizeof mesh, .name = "tetrahedron", .vertex_count = 4, .indices = faces,
+        .index_count = 12};
+    material = (TranslucentMaterial){.struct_size = sizeof material, .name = "stone", .preset = "marble"};
+    TranslucentScene *solid;
+    expect(translucent_scene_create_from_meshes(&mesh, 1, &material, 1, &solid), ARGUMENT, "mesh.positions is null");
+    mesh.positions = corners;
+    expect(translucent_scene_create_from_meshes(&mesh, 1, &material, 1, &solid), TRANSLUCENT_RESULT_INPUT,
+        "meshes[0] (tetrahedron): index 11 is 4, but there are 4 vertices");
+    faces[11] = 3;
+    mesh.transform = projection;
+    expect(translucent_scene_create_from_meshes(&mesh, 1, &material, 1, &solid), ARGUMENT, "last row");
+    mesh.transform = NULL;
+    expect(translucent_scene_create_from_meshes(&mesh, 1, NULL, 1, &solid), ARGUMENT, "materials is null");
+    expect(translucent_scene_create_from_meshes(&mesh, 1, &material, 0, &solid), TRANSLUCENT_RESULT_INPUT,
+        "has material 0 of 0");
+    mesh.struct_size = 8;
+    expect(translucent_scene_create_from_meshes(&mesh, 1, &material, 1, &solid), ARGUMENT, "mesh.struct_size is 8");
+    if (solid) return 1;
+    mesh.struct_size = sizeof mesh;
+    if (translucent_scene_create_from_meshes(&mesh, 1, &material, 1, &solid) != TRANSLUCENT_RESULT_OK) return 1;
+    if (translucent_scene_material_name(solid, 0, &name) != TRANSLUCENT_RESULT_OK || strcmp(name, "stone")) return 1;
+    translucent_scene_destroy(solid);
+    expect(translucent_renderer_update(NULL, scene), ARGUMENT, "renderer is null");
+
     TranslucentSettings settings = {.struct_size = sizeof settings};
     if (translucent_settings_default(&settings) != TRANSLUCENT_RESULT_OK || settings.width != 512) return 1;
     settings.model = "standard";

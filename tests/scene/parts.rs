@@ -4,7 +4,7 @@ use super::build::spot;
 use glam::{DAffine3, DVec2, DVec3, EulerRot};
 use translucent::{
     Scene,
-    scene::{Appearance, LengthKind, Material, Medium, Mesh, Picture, Texture, preset},
+    scene::{Appearance, Camera, LengthKind, Lens, Light, LightKind, Material, Medium, Mesh, Picture, Texture, preset},
     shared::{RAMP, TEXTURE_BASE_COLOR, TEXTURE_NORMAL},
 };
 
@@ -200,4 +200,44 @@ fn no_input_panics() {
         made += usize::from(Scene::from_meshes(shown, vec![wax(), textured()], vec![picture(1), picture(2)]).is_ok());
     }
     assert!(made > 100, "{made} of them are scenes");
+}
+
+#[test]
+fn setters_refuse_what_is_none_and_bring_the_hash_up_to_date() {
+    let mut scene = Scene::from_meshes(&[tetrahedron()], vec![wax()], vec![]).expect("a scene");
+    let before = scene.clone();
+    let lens = Lens::Perspective { yfov: 0.7, aspect: None };
+    let camera = Camera::new("mine", DVec3::Z * 3.0, DVec3::NEG_Z, DVec3::Y, lens);
+    let light = Light {
+        name: "sun".into(),
+        position: DVec3::ZERO,
+        direction: DVec3::NEG_Z,
+        intensity: DVec3::ONE,
+        kind: LightKind::Directional,
+        range: None,
+    };
+    let refused = [
+        scene.set_cameras(vec![camera.clone(), Camera::new("flat", DVec3::ZERO, DVec3::Y, DVec3::Y, lens)]),
+        scene.set_cameras(vec![Camera { eye: DVec3::splat(1e12), ..camera.clone() }]),
+        scene.set_lights(vec![light.clone(), Light { direction: DVec3::ZERO, ..light.clone() }]),
+        scene.set_lights(vec![Light { intensity: DVec3::splat(f64::NAN), ..light.clone() }]),
+        scene.set_material(1, wax()),
+        scene.set_material(0, Material::default()),
+        scene.set_material(0, Material { set: Some("other".into()), ..wax() }),
+        scene.set_material(0, Material { ior: 100.0, ..wax() }),
+        scene.set_material(0, Material { textures: textured().textures, ..wax() }),
+    ];
+    for result in &refused {
+        assert!(result.as_ref().is_err_and(|error| error.is_input()), "{refused:?}");
+    }
+    assert_eq!((&scene.hash, &scene.materials), (&before.hash, &before.materials));
+    let mut hashes = vec![scene.hash.clone()];
+    scene.set_cameras(vec![camera]).expect("a camera");
+    hashes.push(scene.hash.clone());
+    scene.set_lights(vec![light]).expect("a light");
+    hashes.push(scene.hash.clone());
+    scene.set_material(0, Material { roughness: 0.5, ..wax() }).expect("matter");
+    hashes.push(scene.hash.clone());
+    hashes.dedup();
+    assert_eq!(hashes.len(), 4);
 }

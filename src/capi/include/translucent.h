@@ -154,6 +154,65 @@ typedef struct TranslucentDeviceInfo {
   const struct TranslucentAllocator *allocator;
 } TranslucentDeviceInfo;
 
+// Triangles of one material.
+typedef struct TranslucentMesh {
+  // sizeof(TranslucentMesh).
+  size_t struct_size;
+  // For messages; may be null.
+  const char *name;
+  // Three floats for each vertex.
+  const float *positions;
+  // Three floats for each vertex, of any length; null: triangles are flat.
+  const float *normals;
+  uint32_t vertex_count;
+  // Three for each triangle, counter-clockwise seen from outside.
+  const uint32_t *indices;
+  uint32_t index_count;
+  // Index of the material.
+  uint32_t material;
+  // Name of the set with whose matter it exchanges light; null: meshes of one material are one set where their
+  // borders meet.
+  const char *set;
+  // 4 x 4 numbers, column by column, from its positions to metres; null: they are metres.
+  const double *transform;
+} TranslucentMesh;
+
+// What fills a translucent material.
+typedef struct TranslucentMatter {
+  // sizeof(TranslucentMatter).
+  size_t struct_size;
+  // Reduced scattering coefficient of red, green and blue [1/m].
+  double sigma_s_prime[3];
+  // Absorption coefficient [1/m].
+  double sigma_a[3];
+  // Index of refraction.
+  double ior;
+} TranslucentMatter;
+
+// A material. All that is 0 or null is black, smooth, opaque.
+typedef struct TranslucentMaterial {
+  // sizeof(TranslucentMaterial).
+  size_t struct_size;
+  // For messages; may be null.
+  const char *name;
+  // Name of measured matter such as "marble"; null: none.
+  const char *preset;
+  // What fills it, in place of a preset; null: nothing.
+  const struct TranslucentMatter *matter;
+  // The model of its matter, as in TranslucentSettings; null leaves the choice to the library.
+  const char *model;
+  // Linear colour of an opaque surface, 0 to 1.
+  double base_color[3];
+  // 0 to 1.
+  double metallic;
+  // 0 to 1.
+  double roughness;
+  // Emitted radiance.
+  double emission[3];
+  // VK_TRUE: both sides emit.
+  VkBool32 two_sided;
+} TranslucentMaterial;
+
 // Everything about a render that is not the scene. translucent_settings_default fills it in.
 typedef struct TranslucentSettings {
   // sizeof(TranslucentSettings).
@@ -210,6 +269,20 @@ typedef struct TranslucentOutput {
   VkBuffer progress;
 } TranslucentOutput;
 
+// A .gltf or .glb file.
+typedef struct TranslucentSceneInfo {
+  // sizeof(TranslucentSceneInfo).
+  size_t struct_size;
+  // Its name; beside it buffers and images are looked for.
+  const char *file;
+  // Its contents; null: they are read from the file. They are copied.
+  const void *data;
+  // Bytes of data.
+  size_t size;
+  // Metres of one unit of its geometry; 0 stands for 1.
+  double unit;
+} TranslucentSceneInfo;
+
 // A camera; lengths in metres.
 typedef struct TranslucentCamera {
   // sizeof(TranslucentCamera).
@@ -244,32 +317,6 @@ typedef struct TranslucentLight {
   double range;
 } TranslucentLight;
 
-// What fills a translucent material.
-typedef struct TranslucentMatter {
-  // sizeof(TranslucentMatter).
-  size_t struct_size;
-  // Reduced scattering coefficient of red, green and blue [1/m].
-  double sigma_s_prime[3];
-  // Absorption coefficient [1/m].
-  double sigma_a[3];
-  // Index of refraction.
-  double ior;
-} TranslucentMatter;
-
-// A .gltf or .glb file.
-typedef struct TranslucentSceneInfo {
-  // sizeof(TranslucentSceneInfo).
-  size_t struct_size;
-  // Its name; beside it buffers and images are looked for.
-  const char *file;
-  // Its contents; null: they are read from the file. They are copied.
-  const void *data;
-  // Bytes of data.
-  size_t size;
-  // Metres of one unit of its geometry; 0 stands for 1.
-  double unit;
-} TranslucentSceneInfo;
-
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -298,6 +345,17 @@ enum TranslucentResult translucent_device_create(const struct TranslucentDeviceI
 
 // Destroys it; scenes and renderers live on. Null is ignored.
 void translucent_device_destroy(struct TranslucentDevice *device);
+
+// Makes and checks a scene of vertices and materials, which are copied. Without lights (translucent_scene_set_lights,
+// translucent_scene_set_environment) it is dark; without a camera (translucent_scene_set_camera) one frames it. The
+// rules are those of glTF files, with each mesh a node: winding is repaired, triangles without area are dropped.
+//
+// The BVH is built on the host: vertices that only a VkBuffer holds have to be read back by the caller, once.
+enum TranslucentResult translucent_scene_create_from_meshes(const struct TranslucentMesh *meshes,
+                                                            uint32_t mesh_count,
+                                                            const struct TranslucentMaterial *materials,
+                                                            uint32_t material_count,
+                                                            struct TranslucentScene **out);
 
 // Fills in the defaults: 512 x 512 pixels, seed 0, one direction, variance, no environment behind the scene.
 enum TranslucentResult translucent_settings_default(struct TranslucentSettings *settings);
@@ -363,23 +421,6 @@ enum TranslucentResult translucent_renderer_record_copy(const struct Translucent
 enum TranslucentResult translucent_renderer_output(const struct TranslucentRenderer *renderer,
                                                    struct TranslucentOutput *output);
 
-// From which sample the ranges of recordings count. No execution may be going on, here and in the functions below.
-enum TranslucentResult translucent_renderer_set_first_sample(struct TranslucentRenderer *renderer, uint32_t first);
-
-// Looks through another camera. Sums are forgotten.
-enum TranslucentResult translucent_renderer_set_camera(struct TranslucentRenderer *renderer,
-                                                       const struct TranslucentCamera *camera);
-
-// Replaces the scene's lights by as many others; one that is switched off has the intensity 0. Sums are forgotten.
-enum TranslucentResult translucent_renderer_set_lights(struct TranslucentRenderer *renderer,
-                                                       const struct TranslucentLight *lights,
-                                                       uint32_t count);
-
-// Gives a translucent material other matter, under the model that it has. Sums are forgotten.
-enum TranslucentResult translucent_renderer_set_matter(struct TranslucentRenderer *renderer,
-                                                       uint32_t material,
-                                                       const struct TranslucentMatter *matter);
-
 // Adds the next samples, submitted to the device's queue, and waits for them.
 enum TranslucentResult translucent_renderer_render(struct TranslucentRenderer *renderer, uint32_t samples);
 
@@ -419,6 +460,47 @@ enum TranslucentResult translucent_scene_material_name(const struct TranslucentS
 
 // Destroys it; renderers live on. Null is ignored.
 void translucent_scene_destroy(struct TranslucentScene *scene);
+
+// Renders another state of the scene from now on: the one that the renderer was made of, with other materials, lights,
+// cameras or environment (translucent_scene_set_*), whose geometry stays. It is written into the buffers that there
+// are; what is large and not where the host reaches it goes through the device's queue and is waited for. Sums are
+// forgotten. INPUT, with the reason, for what needs a new renderer: nothing was changed then.
+//
+// A model that was chosen for a material stays, where neither settings nor material name one. There is room for the
+// tables of any matter, as many lights, and no more of the environment than at first.
+enum TranslucentResult translucent_renderer_update(struct TranslucentRenderer *renderer,
+                                                   const struct TranslucentScene *scene);
+
+// From which sample the ranges of recordings count. No execution may be going on, here and in the functions below.
+enum TranslucentResult translucent_renderer_set_first_sample(struct TranslucentRenderer *renderer, uint32_t first);
+
+// Looks through another camera. Sums are forgotten.
+enum TranslucentResult translucent_renderer_set_camera(struct TranslucentRenderer *renderer,
+                                                       const struct TranslucentCamera *camera);
+
+// Replaces the scene's lights by as many others; one that is switched off has the intensity 0. Sums are forgotten.
+enum TranslucentResult translucent_renderer_set_lights(struct TranslucentRenderer *renderer,
+                                                       const struct TranslucentLight *lights,
+                                                       uint32_t count);
+
+// Gives a translucent material other matter, under the model that it has. Sums are forgotten.
+enum TranslucentResult translucent_renderer_set_matter(struct TranslucentRenderer *renderer,
+                                                       uint32_t material,
+                                                       const struct TranslucentMatter *matter);
+
+// Replaces the cameras of a scene by one.
+enum TranslucentResult translucent_scene_set_camera(struct TranslucentScene *scene,
+                                                    const struct TranslucentCamera *camera);
+
+// Replaces the lights of a scene.
+enum TranslucentResult translucent_scene_set_lights(struct TranslucentScene *scene,
+                                                    const struct TranslucentLight *lights,
+                                                    uint32_t count);
+
+// Replaces a material of a scene by another without textures; its name stays, and whether it is translucent must.
+enum TranslucentResult translucent_scene_set_material(struct TranslucentScene *scene,
+                                                      uint32_t index,
+                                                      const struct TranslucentMaterial *material);
 
 #ifdef __cplusplus
 }  // extern "C"
