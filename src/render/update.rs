@@ -7,7 +7,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     gpu::upload,
-    prepare::{Prepared, delta_light, prepare_again, replaced, view_of},
+    prepare::{Before, Prepared, delta_light, prepare_again, replaced, view_of},
     scene::{self, Camera, Light, Scene},
     shared::{Progress, Slot, View},
 };
@@ -21,10 +21,14 @@ impl Renderer {
     /// into the buffers that there are, also where [`Renderer::set_camera`] and the like had changed it.
     ///
     /// *Models.* Where settings and materials leave the model to us, the one that was chosen for a material stays, so that
-    /// kernels do; a new renderer might choose another. Ask for a model ([`Medium::model`](scene::Medium::model)) that a
-    /// range of matter needs. Tables of other matter are interpolated in milliseconds from those that are shipped, and
-    /// simulated (half a minute) for an index or g that is not among them, as when a renderer is made. Balances of curved
-    /// bodies are found anew; [`Renderer::set_material`] is for matter that changes with every frame.
+    /// kernels do; a new renderer might choose another. Ask for a model ([`Medium::model`](scene::Medium::model)) that
+    /// suits a range of matter.
+    ///
+    /// *Time.* If no material is another one, what is made of the rest: milliseconds, and the environment's table. Else
+    /// that of a new renderer without its kernels: tables are interpolated (or simulated, half a minute, for an index or g
+    /// that is not among those shipped), and where profiles depend on curvatures those are balanced over the whole body,
+    /// which takes seconds for thousands of triangles. [`Renderer::set_material`] is for matter that changes with every
+    /// frame.
     ///
     /// *Room.* A renderer with [`Settings::recording`](crate::Settings::recording) has room for the tables of any matter
     /// and for a rough boundary of each material. Other buffers have the size of what they first held, or of the caller's
@@ -50,7 +54,8 @@ impl Renderer {
         if let Some((_, new)) = self.authored.iter().zip(&scene.materials).find(|(old, new)| old.kind() != new.kind()) {
             return refuse(format!("material `{}`", new.name), "its kind of matter or set decides on the geometry");
         }
-        let mut new = prepare_again(scene, &self.settings, &self.prepared.advice)?;
+        let before = Before { prepared: &self.prepared, authored: &self.authored };
+        let mut new = prepare_again(scene, &self.settings, Some(before))?;
         new.features.counters = self.prepared.features.counters;
         self.check_fit(&new)?;
 

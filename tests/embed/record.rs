@@ -9,7 +9,7 @@ use translucent::{
     shared::{Pixel, Progress, Slot},
 };
 
-const SIZE: u32 = 8;
+pub const SIZE: u32 = 8;
 
 pub fn settings() -> Settings {
     Settings { seed: 7, resolution: Some((SIZE, SIZE)), model: Model::Standard, recording: true, ..Settings::default() }

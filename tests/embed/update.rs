@@ -3,14 +3,17 @@
 use super::{
     app::App,
     leaks,
-    record::{record, same, settings},
+    record::{SIZE, record, same, settings},
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use translucent::{
     Device, Environment, Image, LoadOptions, Model, Renderer, Scene, Settings,
-    measure::scenes::{Eye, Mesh, gltf, matter, sun},
+    ash::vk,
+    gpu::{Buffer, Location, RawDevice},
+    measure::scenes::{self, Eye, gltf, matter, sun},
     prepare::{Prepared, prepare},
-    scene::EnvironmentMap,
+    scene::{EnvironmentMap, Material, Mesh, Picture, Texture},
+    shared::TEXTURE_BASE_COLOR,
 };
 
 const EYE: Eye = Eye { eye: DVec3::new(0.0, 0.0, 3.0), at: DVec3::ZERO, lens: 0.7 };
@@ -21,7 +24,7 @@ fn read(file: serde_json::Value) -> Scene {
 
 /// An ellipsoid of matter for which diffusion is not enough, and a lamp.
 fn pebble() -> Scene {
-    let mut mesh = Mesh::sphere(1.0, 6);
+    let mut mesh = scenes::Mesh::sphere(1.0, 6);
     mesh.positions.iter_mut().for_each(|position| *position *= DVec3::new(1.0, 0.6, 0.3));
     let lamp = serde_json::json!({"type": "point", "intensity": 10.0});
     let lights = [(lamp, DVec3::new(1.0, 2.0, 3.0), DVec3::ZERO)];
@@ -91,11 +94,11 @@ fn tables_lights_camera_and_environment_change_without_an_allocation() {
 
 /// A ball of two halves of one set with a profile each, and a lamp of four quads, in the light of a picture.
 fn halves() -> Scene {
-    let sphere = Mesh::sphere(1.0, 4);
+    let sphere = scenes::Mesh::sphere(1.0, 4);
     let half = |right: bool| {
         let side = |t: &&[u32]| t.iter().map(|&i| sphere.positions[i as usize].x).sum::<f64>() > 0.0;
         let indices = sphere.indices.chunks_exact(3).filter(|t| side(t) == right).flatten().copied().collect();
-        Mesh { indices, ..sphere.clone() }
+        scenes::Mesh { indices, ..sphere.clone() }
     };
     let materials = [("burley", 50.0), ("table", 5.0)].map(|(model, scattering)| {
         let mut material = matter([scattering; 3], [0.1, 0.5, 2.0], 1.3);
@@ -106,7 +109,7 @@ fn halves() -> Scene {
         material
     });
     let lamp = serde_json::json!({"name": "lamp", "emissiveFactor": [1, 1, 1], "doubleSided": true});
-    let mut quads = Mesh::default();
+    let mut quads = scenes::Mesh::default();
     (0..4).for_each(|i| quads.quad(DVec3::new(f64::from(i), 2.0, 0.0), DVec3::X * 0.5, DVec3::Z * 0.5));
     let [burley, table] = materials;
     let lights = [(sun(), DVec3::Z, DVec3::NEG_Z)];
@@ -170,4 +173,54 @@ fn mixed_media_rough_boundaries_emitters_and_pictures_change_or_are_refused_by_n
     renderer.update(&other).expect("it fits");
     renderer.render(4).expect("a render");
     same(&renderer.image().expect("an image"), &rendered(&device, &other, &settings, 4));
+
+    // Light alone: nothing is made anew of the materials.
+    other.lights[0].intensity *= 4.0;
+    other.environment = picture(4, 3.0);
+    renderer.update(&other).expect("it fits");
+    renderer.render(4).expect("a render");
+    same(&renderer.image().expect("an image"), &rendered(&device, &other, &settings, 4));
+}
+
+#[test]
+fn pictures_change_on_a_device_without_a_queue() {
+    let app = App::new();
+    let device = unsafe { Device::from_raw(RawDevice { queue: None, ..app.raw() }) }.expect("the device is fit");
+    let (corners, indices) =
+        ([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], [0, 1, 2, 0, 2, 3]);
+    let uv = corners.map(|[x, y, _]: [f32; 3]| [x, y]);
+    let mesh = Mesh { positions: &corners, indices: &indices, uvs: [Some(&uv), None], ..Mesh::default() };
+    let mut board = Material { metallic: 0.0, ..Material::default() };
+    board.textures[TEXTURE_BASE_COLOR as usize] = Some(Texture { nearest: true, ..Texture::default() });
+    let picture = |texels: &[u32]| Picture { width: texels.len() as u32, height: 1, texels: texels.to_vec() };
+    let first = picture(&[0xff00_00ff, 0xff00_ff00, 0xffff_0000]);
+    let mut scene = Scene::from_meshes(&[mesh], vec![board], vec![first]).expect("a scene");
+    scene.set_environment(Environment::constant(DVec3::ONE).expect("a radiance")).expect("an environment");
+    let mut renderer = Renderer::new(&device, &scene, &settings()).expect("a renderer");
+    let commands = record(&app, &renderer, 0..4);
+    let colors = |renderer: &Renderer| {
+        let back = Buffer::new(&device, "back", u64::from(SIZE * SIZE) * 16, Location::Readback).expect("memory");
+        let copy = app.commands(|commands| unsafe {
+            let from = renderer.output().expect("it records").colors;
+            app.device.cmd_copy_buffer(commands, from, back.raw(), &[vk::BufferCopy::default().size(back.bytes())]);
+            app.for_the_host(commands);
+        });
+        app.submit(&[commands, copy]);
+        back.read::<Vec4>()
+    };
+    let before = colors(&renderer);
+    let mut other = scene.clone();
+    other.pictures[0] = picture(&[0xff80_4020, 0xff20_4080]);
+    renderer.update(&other).expect("a smaller picture fits");
+    let after = colors(&renderer);
+    let ours = app.open();
+    let expected = rendered(&ours, &other, &settings(), 4);
+    let green: Vec<f32> = after.iter().map(|color| color.y).collect();
+    assert!(expected.channel("G") == Some(&green[..]) && after != before);
+    other.pictures[0] = picture(&[!0; 4]);
+    let error = renderer.update(&other).expect_err("a larger one does not").to_string();
+    assert!(error.starts_with("buffer texels: "), "{error}");
+    assert_eq!(colors(&renderer), after);
+    drop((renderer, device, ours));
+    app.close();
 }
