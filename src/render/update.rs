@@ -89,7 +89,8 @@ impl Renderer {
         if new.lights.len() != old.lights.len() {
             return refuse("lights", format!("{} in place of {}", new.lights.len(), old.lights.len()));
         }
-        for (new, old) in new.features.named().iter().zip(old.features.named()).filter(|(new, old)| *new != old) {
+        let (asked, made) = (new.features.named(), old.features.named());
+        if let Some((new, old)) = asked.iter().zip(&made).find(|(new, old)| new != old) {
             let problem = format!("{} in place of {} ({})", new.value, old.value, new.about.trim_end_matches('.'));
             return refuse(format!("feature {}", new.name), problem);
         }
