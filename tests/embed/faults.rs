@@ -147,7 +147,7 @@ fn results(function: &str) -> &'static [vk::Result] {
 }
 
 /// One such test at a time: faults and counts are of the process.
-fn alone() -> MutexGuard<'static, ()> {
+pub fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -279,6 +279,38 @@ fn every_transfer_of_a_render_in_bands_may_fail() {
     // Sums go to the host and back.
     sweep(&device, &Job::new(2, 33), &["vkQueueSubmit2", "vkWaitForFences"], false);
     drop(device);
+    app.close();
+}
+
+#[test]
+fn every_copy_of_an_update_may_fail() {
+    let _alone = alone();
+    let app = App::wrapped(wrap);
+    let device = staged(&app);
+    let job = Job::new(1, 4);
+    let mut other = job.scene.clone();
+    other.materials[0].medium.as_mut().expect("it is translucent").sigma_a *= 3.0;
+    other.lights[0].intensity *= 2.0;
+    let expected = job.go_on(&device, &mut None).expect("no fault is set");
+    let mut renderer = job.renderer(&device).expect("no fault is set");
+    set(None, false);
+    renderer.update(&other).expect("no fault is set");
+    let calls = set(None, false);
+    renderer.update(&job.scene).expect("no fault is set");
+    for function in ["vkQueueSubmit2", "vkWaitForFences"] {
+        assert!(calls[function] >= 2, "materials and lights: {calls:?}");
+        for number in 1..=calls[function] {
+            let result = results(function)[number % 3];
+            set(Some((function, number, result)), false);
+            check(&renderer.update(&other).expect_err(function), function, result);
+            set(None, false);
+            // Whatever was copied before the fault is copied again.
+            renderer.update(&job.scene).expect("the fault is over");
+            renderer.render(job.samples).expect("no fault is set");
+            assert!(renderer.image().expect("no fault is set") == expected, "{function} number {number}");
+        }
+    }
+    drop((renderer, device));
     app.close();
 }
 

@@ -2,7 +2,7 @@
 
 use super::{
     app::App,
-    leaks,
+    faults, leaks,
     record::{SIZE, record, same, settings},
 };
 use glam::{DVec3, Vec3, Vec4};
@@ -54,6 +54,8 @@ fn model(prepared: &Prepared) -> Model {
 
 #[test]
 fn tables_lights_camera_and_environment_change_without_an_allocation() {
+    // Its counts are of the process.
+    let _alone = faults::alone();
     let app = App::validated(leaks::wrap);
     let device = app.open();
     let (scene, settings) = (pebble(), Settings { model: Model::Auto, ..settings() });
