@@ -120,8 +120,8 @@ pub const MAX_SIDE: u32 = 65_536;
 
 /// Checks the settings against the scene and fills the shared structs.
 ///
-/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions, projection or environment cannot be had, and
-/// for materials, lights or cameras that a caller put into the scene and that are none.
+/// Fails with [`Error::Setting`] if the resolution, crop, camera, directions, projection or environment cannot be had,
+/// and for materials, lights or cameras that a caller put into the scene and that are none.
 pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Prepared> {
     prepare_again(scene, settings, None)
 }
@@ -133,8 +133,8 @@ pub(crate) struct Before<'a> {
     pub authored: &'a [scene::Material],
 }
 
-/// As [`prepare`], for the same geometry and settings as before. The models of materials stay as they were chosen, unless
-/// settings or materials ask for one; of the same materials nothing is made anew.
+/// As [`prepare`], for the same geometry and settings as before. The models of materials stay as they were chosen,
+/// unless settings or materials ask for one; of the same materials nothing is made anew.
 pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<Before>) -> Result<Prepared> {
     scene::check_scene(scene)?;
     let (width, height) = resolution(scene, settings)?;

@@ -191,9 +191,9 @@ pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slo
     of_scene.chain(of_band).chain(counters).chain(recorded).collect()
 }
 
-/// Bytes that a buffer of a renderer that records may come to need when matter changes ([`Renderer::update`]): as many as
-/// there are for tables of any matter, 482 kB for each material (12 kB where profiles do not depend on curvatures), and a
-/// rough boundary of each translucent material's own.
+/// Bytes that a buffer of a renderer that records may come to need when matter changes ([`Renderer::update`]): tables
+/// of any matter, 482 kB for each material (12 kB where profiles do not depend on curvatures), and a rough boundary of
+/// each translucent material's own.
 ///
 /// [`Renderer::update`]: super::Renderer::update
 fn room(prepared: &Prepared, slot: Slot) -> u64 {

@@ -16,31 +16,32 @@ use crate::{
 /// renderer that records. No recording may be executing. Sums of what was before are forgotten: the next recording, or
 /// `render`, starts new ones.
 impl Renderer {
-    /// Renders `scene` from now on: the one that it was made of, or a clone, of which the caller changed fields. Materials,
-    /// lights, cameras, environment and pictures may be other ones; geometry and sets stay. What is different is written
-    /// into the buffers that there are, also where [`Renderer::set_camera`] and the like had changed it.
+    /// Renders `scene` from now on: the one that it was made of, or a clone, of which the caller changed fields.
+    /// Materials, lights, cameras, environment and pictures may be other ones; geometry and sets stay. What is
+    /// different is written into the buffers that there are, also where [`Renderer::set_camera`] and the like had
+    /// changed it.
     ///
-    /// *Models.* Where settings and materials leave the model to us, the one that was chosen for a material stays, so that
-    /// kernels do; a new renderer might choose another. Ask for a model ([`Medium::model`](scene::Medium::model)) that
-    /// suits a range of matter.
+    /// *Models.* Where settings and materials leave the model to us, the one that was chosen for a material stays, so
+    /// that kernels do; a new renderer might choose another. Ask for a model
+    /// ([`Medium::model`](scene::Medium::model)) that suits a range of matter.
     ///
     /// *Time.* If no material is another one, what is made of the rest: milliseconds, and the environment's table. Else
-    /// that of a new renderer without its kernels: tables are interpolated (or simulated, half a minute, for an index or g
-    /// that is not among those shipped), and where profiles depend on curvatures those are balanced over the whole body,
-    /// which takes seconds for thousands of triangles. [`Renderer::set_material`] is for matter that changes with every
-    /// frame.
+    /// that of a new renderer without its kernels: tables are interpolated (or simulated, half a minute, for an index
+    /// or g that is not among those shipped), and where profiles depend on curvatures those are balanced over the whole
+    /// body, which takes seconds for thousands of triangles. [`Renderer::set_material`] is for matter that changes with
+    /// every frame.
     ///
-    /// *Room.* A renderer with [`Settings::recording`](crate::Settings::recording) has room for the tables of any matter
-    /// and for a rough boundary of each material. Other buffers have the size of what they first held, or of the caller's
-    /// ([`Renderer::with_buffers`]): as many lights, no more texels, environment or emitting triangles.
+    /// *Room.* A renderer with [`Settings::recording`](crate::Settings::recording) has room for the tables of any
+    /// matter and for a rough boundary of each material. Other buffers have the size of what they first held, or of the
+    /// caller's ([`Renderer::with_buffers`]): as many lights, no more texels, environment or emitting triangles.
     ///
-    /// *Submissions.* Camera, lights and materials of such a renderer are in memory that the host writes. The rest, where
-    /// it is different and the host does not reach it, goes through the device's queue and is waited for.
+    /// *Submissions.* Camera, lights and materials of such a renderer are in memory that the host writes. The rest,
+    /// where it is different and the host does not reach it, goes through the device's queue and is waited for.
     ///
     /// # Errors
-    /// [`Error::Setting`], which names it, for a scene that has other geometry, breaks a rule, or needs another pipeline or
-    /// a larger buffer, such as the first emitter, another kind of environment or model, opaque matter for translucent.
-    /// Nothing was changed then. After [`Error::Vulkan`] or [`Error::Memory`] of a copy, an update or
+    /// [`Error::Setting`], which names it, for a scene that has other geometry, breaks a rule, or needs another
+    /// pipeline or a larger buffer, such as the first emitter, another kind of environment or model, opaque matter for
+    /// translucent. Nothing was changed then. After [`Error::Vulkan`] or [`Error::Memory`] of a copy, an update or
     /// [`Renderer::resume`] brings the device up to date.
     pub fn update(&mut self, scene: &Scene) -> Result<()> {
         let geometry = scene::geometry(scene);
@@ -150,9 +151,9 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Setting`] for an index that the scene does not have, for numbers out of range, and where more than one
-    /// material's numbers would change: opaque matter for translucent, other textures, emission or sets, another roughness
-    /// of translucent matter, the table model, sets of several materials, single scattering where there was none.
-    /// [`Renderer::update`] does most of those.
+    /// material's numbers would change: opaque matter for translucent, other textures, emission or sets, another
+    /// roughness of translucent matter, the table model, sets of several materials, single scattering where there was
+    /// none. [`Renderer::update`] does most of those.
     pub fn set_material(&mut self, index: usize, material: &scene::Material) -> Result<()> {
         let Some(old) = self.authored.get(index) else {
             let problem = format!("there are {}, none has the index {index}", self.authored.len());

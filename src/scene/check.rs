@@ -157,8 +157,8 @@ impl Scene {
     /// Replaces the lights.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a light with numbers that are not finite, a negative intensity, no direction, a cone that is
-    /// none, or that is too far away or too bright. Nothing was changed then.
+    /// [`Error::Setting`] for a light with numbers that are not finite, a negative intensity, no direction, a cone that
+    /// is none, or that is too far away or too bright. Nothing was changed then.
     pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<()> {
         lights.iter().try_for_each(|light| check_light(light, &self.frame))?;
         self.lights = lights;
@@ -169,8 +169,8 @@ impl Scene {
     /// Replaces the cameras; without any, one frames the scene.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a camera that is no rotation, has no angle of view or is too far away. Nothing was changed
-    /// then.
+    /// [`Error::Setting`] for a camera that is no rotation, has no angle of view or is too far away. Nothing was
+    /// changed then.
     pub fn set_cameras(&mut self, cameras: Vec<Camera>) -> Result<()> {
         cameras.iter().try_for_each(|camera| check_camera(camera, &self.frame))?;
         self.cameras = cameras;
@@ -178,13 +178,13 @@ impl Scene {
         Ok(())
     }
 
-    /// Replaces the material number `index`. Whether it is translucent, hidden or names a set decided on the geometry, and
-    /// stays.
+    /// Replaces the material number `index`. Whether it is translucent, hidden or names a set decided on the geometry,
+    /// and stays.
     ///
     /// # Errors
-    /// [`Error::Setting`] for an index that there is not, another kind of material, numbers out of their ranges, pictures
-    /// or coordinates that the scene does not have, another index of refraction than that of its set. Nothing was changed
-    /// then.
+    /// [`Error::Setting`] for an index that there is not, another kind of material, numbers out of their ranges,
+    /// pictures or coordinates that the scene does not have, another index of refraction than that of its set. Nothing
+    /// was changed then.
     pub fn set_material(&mut self, index: usize, material: Material) -> Result<()> {
         let count = self.materials.len();
         let Some(place) = self.materials.get_mut(index) else {

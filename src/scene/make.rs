@@ -62,8 +62,8 @@ impl Medium {
     /// Matter of a surface albedo and a length under a boundary of this index of refraction.
     ///
     /// # Errors
-    /// [`Error::Setting`] for albedos outside of 0 to 1, lengths that are not positive, an index that is out of its range,
-    /// and a diffuse mean free path with an albedo of 1.
+    /// [`Error::Setting`] for albedos outside of 0 to 1, lengths that are not positive, an index that is out of its
+    /// range, and a diffuse mean free path with an albedo of 1.
     pub fn from_appearance(appearance: Appearance, ior: f64) -> Result<Medium> {
         let Appearance { albedo, length, kind } = appearance;
         let wrong = |problem: String| Error::setting("appearance", problem);

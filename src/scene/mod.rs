@@ -42,8 +42,8 @@ use std::path::{Path, PathBuf};
 
 /// A scene that passed every check of [`Scene::load`] or [`Scene::from_meshes`].
 ///
-/// Its geometry stays. Materials, lights, cameras and pictures may be changed or filled in by the caller; what breaks a rule
-/// then is refused when a renderer is made or [updated](crate::Renderer::update).
+/// Its geometry stays. Materials, lights, cameras and pictures may be changed or filled in by the caller; what breaks a
+/// rule then is refused when a renderer is made or [updated](crate::Renderer::update).
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Where it came from, for messages.

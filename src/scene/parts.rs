@@ -48,11 +48,11 @@ pub struct Mesh<'a> {
 const FILE: &str = "the caller's meshes";
 
 impl Scene {
-    /// A scene of vertices in memory, which are copied. A mesh counts as a node of a glTF file with one material: the same
-    /// rules make [sets](super::Set) of meshes, repair their winding, drop triangles without area, and warn. Materials
-    /// keep their numbers. There is no light and no camera (one frames the scene) until the caller fills the
-    /// [lights](Scene::lights), [cameras](Scene::cameras) and the [environment](Scene::set_environment); they are checked
-    /// when a renderer is made.
+    /// A scene of vertices in memory, which are copied. A mesh counts as a node of a glTF file with one material: the
+    /// same rules make [sets](super::Set) of meshes, repair their winding, drop triangles without area, and warn.
+    /// Materials keep their numbers. There is no light and no camera (one frames the scene) until the caller fills the
+    /// [lights](Scene::lights), [cameras](Scene::cameras) and the [environment](Scene::set_environment); they are
+    /// checked when a renderer is made.
     ///
     /// The BVH over the triangles is built on the host. Vertices that only a buffer of the device holds have to be read
     /// back by the caller: that is the one copy that he makes.
