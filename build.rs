@@ -1,15 +1,15 @@
 //! Compiles every `glsl/*.comp` to SPIR-V with glslang (through shaderc), includes resolved, names kept,
-//! and writes `shared.glsl` from `src/shared.rs`.
+//! and writes `shared.glsl` from `src/shared/mod.rs`.
 
 use std::{env, fs, path::Path};
 
-#[path = "src/shared.rs"]
+#[path = "src/shared/mod.rs"]
 #[allow(dead_code)]
 mod shared;
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=src/shared.rs");
+    println!("cargo::rerun-if-changed=src/shared");
     println!("cargo::rerun-if-changed=glsl");
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out = Path::new(&out);

@@ -1,13 +1,14 @@
-//! What profiling costs: the same render in turns without and with a timeline, and the ratio of the two in wall time
-//! and in time of all cores (Linux), with its interval.
+//! What profiling costs. On: the same render in turns without and with a timeline, and the ratio of the two in wall time
+//! and in time of all cores (Linux), with its interval. Off: how long it takes to ask whether there is a timeline, as
+//! often as a timed render notes something.
 //!
 //!     cargo run --release --example profiling_cost -- assets/spot.glb [SIZE [SAMPLES [PAIRS]]]
 
-use std::{error::Error, time::Instant};
+use std::{error::Error, hint::black_box, time::Instant};
 use translucent::{
     Device, DeviceOptions, Environment, Model, Renderer, Scene, Settings,
     bench::statistics::{Estimate, median},
-    profile::Timeline,
+    profile::{self, Timeline},
 };
 
 /// Nanoseconds on a core so far, of all threads; 0 where the system does not tell.
@@ -35,11 +36,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let timeline = Timeline::new();
     let timed = Settings { timeline: Some(timeline.clone()), ..settings.clone() };
     let mut renderers = [Renderer::new(&device, &scene, &settings)?, Renderer::new(&device, &scene, &timed)?];
+    let mut noted = 0;
     let mut render = |index: usize| -> Result<[f64; 2], Box<dyn Error>> {
         renderers[index].reset();
         let (wall, core) = (Instant::now(), cores());
         renderers[index].render(samples)?;
         let times = [wall.elapsed().as_secs_f64(), (cores() - core) * 1e-9];
+        noted = noted.max(timeline.spans().len());
         timeline.clear();
         Ok(times)
     };
@@ -48,6 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         render(index)?;
     }
     let mut ratios = [vec![], vec![]];
+    let mut least = f64::INFINITY;
     for pair in 0..pairs {
         // Each comes first as often as the other.
         let order = if pair % 2 == 0 { [0, 1] } else { [1, 0] };
@@ -55,6 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for index in order {
             times[index] = render(index)?;
         }
+        least = least.min(times[0][0]);
         for (kind, ratios) in ratios.iter_mut().enumerate() {
             ratios.push(times[1][kind] / times[0][kind]);
         }
@@ -68,5 +73,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         let [value, low, high] = [value, low, high].map(|ratio| 100.0 * (ratio - 1.0));
         println!("{name}: {value:+.2} % with profiling ({low:+.2} to {high:+.2} % at {:.1} %)", 100.0 * confidence);
     }
+    const ASKED: u32 = 10_000_000;
+    let start = Instant::now();
+    for _ in 0..ASKED {
+        drop(black_box(profile::begin(black_box(&None), "asked")));
+    }
+    let each = start.elapsed().as_secs_f64() / f64::from(ASKED);
+    let share = 100.0 * each * noted as f64 / least;
+    println!("off: asked {noted} times, {:.1} ns each: {share:.6} % of a render", 1e9 * each);
     Ok(())
 }

@@ -1,4 +1,4 @@
-// What kernels and host share. Written by build.rs from src/shared.rs; do not edit.
+// What kernels and host share. Written by build.rs from src/shared/mod.rs; do not edit.
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
