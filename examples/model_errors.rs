@@ -19,10 +19,9 @@ fn main() -> Result<()> {
     let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "src/docs".into()));
     let mut meshes = vec![("spot".to_string(), corners(&Scene::load("assets/spot.glb")?))];
     for argument in arguments {
-        let (name, file) = argument.split_once('=').ok_or_else(|| Error::Setting {
-            setting: "NAME=FILE".into(),
-            problem: format!("`{argument}` has no ="),
-        })?;
+        let (name, file) = argument
+            .split_once('=')
+            .ok_or_else(|| Error::Setting { setting: "NAME=FILE".into(), problem: format!("`{argument}` has no =") })?;
         meshes.push((name.to_string(), corners(&Scene::load(file)?)));
     }
     let start = Instant::now();
