@@ -8,7 +8,7 @@ use std::{error::Error, hint::black_box, time::Instant};
 use translucent::{
     Device, DeviceOptions, Environment, Model, Renderer, Scene, Settings,
     bench::statistics::{Estimate, median},
-    profile::{self, Timeline},
+    timeline::{self, Timeline},
 };
 
 /// Nanoseconds on a core so far, of all threads; 0 where the system does not tell.
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     const ASKED: u32 = 10_000_000;
     let start = Instant::now();
     for _ in 0..ASKED {
-        drop(black_box(profile::begin(black_box(&None), "asked")));
+        drop(black_box(timeline::begin(black_box(&None), "asked")));
     }
     let each = start.elapsed().as_secs_f64() / f64::from(ASKED);
     let share = 100.0 * each * noted as f64 / least;

@@ -70,9 +70,9 @@
 //! | --- | --- | --- |
 //! | [`shared`] | nothing | every struct, buffer, constant and feature that Rust and GLSL share |
 //! | [`error`] | nothing | [`Error`]: file, item and problem, or the step |
-//! | [`profile`] | nothing | [`profile::Timeline`]: what takes how long; traces and sums |
-//! | [`settings`] | `shared`, `profile` | [`Settings`]: what a caller may choose |
-//! | [`scene`] | `shared`, `error`, `settings`, `profile` | [`Scene`]: files or vertices, rules, geometry, BVH, presets; no Vulkan |
+//! | [`timeline`] | nothing | [`timeline::Timeline`]: what takes how long; traces and sums |
+//! | [`settings`] | `shared`, `timeline` | [`Settings`]: what a caller may choose |
+//! | [`scene`] | `shared`, `error`, `settings`, `timeline` | [`Scene`]: files or vertices, rules, geometry, BVH, presets; no Vulkan |
 //! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
@@ -109,13 +109,13 @@ pub mod measure;
 pub mod model;
 pub mod model_errors;
 pub mod prepare;
-pub mod profile;
 pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod settings;
 pub mod shared;
 pub mod table;
+pub mod timeline;
 pub mod verify;
 
 pub use ash;

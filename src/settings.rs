@@ -1,6 +1,6 @@
 //! What a caller may choose about a render.
 
-use crate::{profile::Timeline, shared};
+use crate::{shared, timeline::Timeline};
 use std::{fmt, str::FromStr};
 
 /// How a sampled point of the tangent plane is carried to the surface.

@@ -17,10 +17,10 @@ pub use report::{Report, Series};
 use crate::{
     Error, Result,
     gpu::{Device, Executable, Statistic},
-    profile::{Counted, Span, Track},
     render::{Renderer, spirv_hash},
     scene::Scene,
     settings::Settings,
+    timeline::{Counted, Span, Track},
 };
 use serde_json::{Value, json};
 use std::time::Instant;

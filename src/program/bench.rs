@@ -15,7 +15,7 @@ use translucent::{
     Device, DeviceOptions, Settings,
     bench::{self, CONFIDENCE, Comparison, Difference, Effort, MAX_REPEATS, Report, Series, compare, statistics},
     image::{check_writable, write_whole},
-    profile::{Timeline, begin},
+    timeline::{Timeline, begin},
 };
 
 #[derive(clap::Args)]

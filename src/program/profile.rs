@@ -5,7 +5,7 @@ use super::{
     tables::{aligned, quoted, row},
 };
 use std::{fmt::Write, path::PathBuf};
-use translucent::{Device, bench::about, image::write_whole, profile::Timeline, render::spirv_hash};
+use translucent::{Device, bench::about, image::write_whole, render::spirv_hash, timeline::Timeline};
 
 /// Writes each file whole or not at all: a trace, or a table where the name ends in .csv.
 pub fn write(timeline: &Timeline, device: &Device, files: &[PathBuf]) -> Result<(), Failure> {

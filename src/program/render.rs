@@ -18,8 +18,8 @@ use std::{
 use translucent::{
     Device, DeviceOptions, Error, Image, Renderer, Settings,
     image::{Attribute, check_writable},
-    profile::{Timeline, begin},
     shared::BATCHES,
+    timeline::{Timeline, begin},
 };
 
 /// The layers that `--aov` knows; R, G, B and A are always there.

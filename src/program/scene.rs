@@ -6,9 +6,9 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
-    profile::Timeline,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
     settings::Directional,
+    timeline::Timeline,
 };
 
 #[derive(clap::Args)]

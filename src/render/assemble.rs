@@ -6,8 +6,8 @@ use crate::{
     error::Result,
     gpu::{Buffer, download_to},
     image::{Attribute, Channel, Image},
-    profile::{self, Work},
     shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
+    timeline::{self, Work},
 };
 use glam::{DVec3, Vec3};
 use std::{collections::BTreeMap, ops::Range};
@@ -22,7 +22,7 @@ pub enum Sums {
 /// Resolves every band and gathers the channels of `interface`: RGBA, subsurface, reflection, variance, N, P, Z,
 /// samples, material.
 pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
-    let _span = profile::begin(&renderer.settings.timeline, "image");
+    let _span = timeline::begin(&renderer.settings.timeline, "image");
     renderer.catch_up();
     let view = renderer.prepared.view;
     let rows = renderer.prepared.rows.clone();
@@ -57,7 +57,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         }
         recorder.submit_and_wait()?;
         renderer.note("resolve", Work { band: band as u32, pixels, ..Work::default() });
-        let span = profile::begin(&renderer.settings.timeline, "download");
+        let span = timeline::begin(&renderer.settings.timeline, "download");
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
         drop(span);

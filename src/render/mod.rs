@@ -17,11 +17,11 @@ use crate::{
     gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
     image::Image,
     prepare::{Prepared, prepare},
-    profile::{self, Work},
     reference::random,
     scene::{self, Frame, Scene},
     settings::Settings,
     shared::{BATCHES, MAX_RAYS, MAX_SINGLE, NO_SAMPLES, Progress as Count, STRATUM, Slot, Step},
+    timeline::{self, Work},
 };
 use bands::Band;
 use std::{
@@ -154,7 +154,7 @@ impl Renderer {
         if !(1..=128).contains(&settings.workgroup) {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
         }
-        let span = profile::begin(&settings.timeline, "prepare");
+        let span = timeline::begin(&settings.timeline, "prepare");
         let mut prepared = prepare(scene, settings)?;
         change(&mut prepared);
         drop(span);
@@ -172,10 +172,10 @@ impl Renderer {
         mut given: Vec<(Slot, Buffer)>,
         bands: Vec<Band>,
     ) -> Result<Renderer> {
-        let span = profile::begin(&settings.timeline, "pipelines");
+        let span = timeline::begin(&settings.timeline, "pipelines");
         let kernels = Kernels::new(device, &prepared, settings.workgroup)?;
         drop(span);
-        let _span = profile::begin(&settings.timeline, "upload");
+        let _span = timeline::begin(&settings.timeline, "upload");
         let recording = settings.recording;
         let mut take = |slot: Slot, bytes: u64, location: Location| {
             let Some(position) = given.iter().position(|(named, _)| *named == slot) else {
@@ -317,7 +317,7 @@ impl Renderer {
         range: Range<u32>,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<bool> {
-        let _span = profile::begin(&self.settings.timeline, "render");
+        let _span = timeline::begin(&self.settings.timeline, "render");
         self.catch_up();
         if range.start >= range.end {
             return Err(Error::setting("samples", format!("{}:{} holds no sample", range.start, range.end)));

@@ -8,9 +8,9 @@ use super::{
 use crate::{
     error::{Error, Result},
     gpu::{Device, download_to, upload},
-    profile,
     scene::{self, Scene},
     shared::{BATCHES, Slot},
+    timeline,
 };
 use std::{
     ops::{ControlFlow, Range},
@@ -27,7 +27,7 @@ impl Renderer {
         if self.resident == Some(band) {
             return Ok(());
         }
-        let _span = profile::begin(&self.settings.timeline, "band");
+        let _span = timeline::begin(&self.settings.timeline, "band");
         self.keep()?;
         if let Some(leaves) = self.resident.take() {
             self.bands[leaves].film = Film::OnHost;

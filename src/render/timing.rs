@@ -1,10 +1,10 @@
-//! What of a render a [`Timeline`](crate::profile::Timeline) is told.
+//! What of a render a [`Timeline`](crate::timeline::Timeline) is told.
 
 use super::{Renderer, assemble};
 use crate::{
     error::Result,
     gpu::{Executable, Recorder, Scope},
-    profile::{Span, Track, Work},
+    timeline::{Span, Track, Work},
 };
 use serde_json::{Value, json};
 use std::iter::once;

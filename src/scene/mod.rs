@@ -33,9 +33,9 @@ pub(crate) use hash::{Geometry, geometry, hash};
 
 use crate::{
     Error, Result,
-    profile::{self, Timeline},
     settings::{Directional, Model, SingleScattering},
     shared,
+    timeline::{self, Timeline},
 };
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -125,7 +125,7 @@ impl Scene {
     /// contents break; [`Error::Setting`] for options that do not fit it. No input makes it panic.
     pub fn load_with(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Scene> {
         let path = path.as_ref();
-        let _load = profile::begin(&options.timeline, "load");
+        let _load = timeline::begin(&options.timeline, "load");
         let bytes = std::fs::read(path).map_err(|error| Error::file(path, error))?;
         Scene::from_bytes(path, &bytes, options)
     }
@@ -163,7 +163,7 @@ impl Scene {
         if too_small > 0 {
             warnings.push(format!("triangles too small for the scene's size were dropped: {too_small}"));
         }
-        let building = profile::begin(timeline, "bvh");
+        let building = timeline::begin(timeline, "bvh");
         let (nodes, order) = bvh::build(file, &triangles)?;
         drop(building);
         let mut scene = Scene {

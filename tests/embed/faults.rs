@@ -22,7 +22,7 @@ use translucent::{
     ash::vk,
     gpu::{Allocation, Allocator, MemoryRequest, RawDevice},
     measure::scenes::{Eye, Mesh, gltf, matter},
-    profile::Timeline,
+    timeline::Timeline,
 };
 
 /// What fails, and what was called since it was set.

@@ -13,7 +13,7 @@ use translucent::{
     ash::vk,
     gpu::{Buffer, Layout, Location, Recorder, download, upload},
     measure::scenes::{Eye, Mesh, gltf, matter},
-    profile::Timeline,
+    timeline::Timeline,
 };
 
 /// Counts the bytes that Rust holds.

@@ -3,7 +3,7 @@
 //!
 //! ```
 //! # fn main() -> translucent::Result<()> {
-//! use translucent::{Device, DeviceOptions, LoadOptions, Renderer, Scene, Settings, profile::Timeline};
+//! use translucent::{Device, DeviceOptions, LoadOptions, Renderer, Scene, Settings, timeline::Timeline};
 //!
 //! let timeline = Timeline::new();
 //! let device = Device::open(&DeviceOptions { profiling: true, ..DeviceOptions::default() })?;
