@@ -96,5 +96,5 @@ fn by_distance(matter: &Matter, c: usize, name: String, light: &[f64], width: f6
     let mut points: Vec<Point> = (0..SIZE.0 as usize).step_by(COLUMNS).map(point).collect();
     points.reverse();
     let curve = even(0.0, width, 200).into_iter().map(|s| (s, form(s))).collect();
-    Series { name, points, curve }.as_far_as_known(matter)
+    Series { name, points, curve }.up_to_where_known(matter)
 }

@@ -87,5 +87,5 @@ fn by_angle(matter: &Matter, c: usize, name: String, light: &[f64]) -> Series {
     let mut points: Vec<Point> = (0..SIZE.1 as usize).step_by(ROWS).map(point).collect();
     points.reverse();
     let curve = even(0.0, 90.0, 181).into_iter().map(|angle| (angle, form(angle.to_radians().cos()))).collect();
-    Series { name, points, curve }.as_far_as_known(matter)
+    Series { name, points, curve }.up_to_where_known(matter)
 }

@@ -42,7 +42,7 @@ impl Matter {
         let mut mesh = scenes::Mesh::default();
         mesh.quad(DVec3::ZERO, DVec3::X, DVec3::Y);
         let eye = scenes::Eye { eye: DVec3::Z, at: DVec3::ZERO, lens: 1.0 };
-        let file = scenes::gltf(&[(mesh, 0)], &[material.clone()], &[], &eye);
+        let file = scenes::gltf(&[(mesh, 0)], std::slice::from_ref(&material), &[], &eye);
         let mut scene = Scene::from_bytes(name, file.to_string().as_bytes(), &LoadOptions::default())?;
         let read = scene.materials.remove(0);
         let medium = read.medium.clone().expect("a material with extras.bssrdf has a medium");

@@ -112,7 +112,7 @@ fn scene_in_uniform_light(file: &Value) -> Result<Scene> {
 impl Series {
     /// The series of an experiment whose closed form holds for profiles that depend on the distance alone, not on the
     /// directions of light and eye.
-    fn as_far_as_known(mut self, matter: &Matter) -> Series {
+    fn up_to_where_known(mut self, matter: &Matter) -> Series {
         if matches!(matter.model, Model::Directional | Model::Table) {
             self.curve.clear();
             self.points.iter_mut().for_each(|point| point.expected = f64::NAN);

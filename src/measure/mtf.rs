@@ -42,7 +42,7 @@ pub fn mtf(setup: &Setup) -> Result<Figure> {
             points.sort_by(|a, b| a.x.total_cmp(&b.x));
             let range = geometric(0.5 * GRATINGS[0] / path, 8.0 / path, 200);
             let curve = range.into_iter().map(|k| (k, matter.profile(c).mtf(k))).collect();
-            series.push(Series { name, points, curve }.as_far_as_known(matter));
+            series.push(Series { name, points, curve }.up_to_where_known(matter));
         }
         notes.push(format!("{}: the body ends where {:.1e} of the light lies beyond", matter.model, matter.lost()));
     }

@@ -61,7 +61,7 @@ pub fn searchlight(setup: &Setup) -> Result<Figure> {
         let mut shown = Series { name: matter.model.to_string(), points, curve };
         if matter.model == Model::Table {
             // Its profile depends on the directions too.
-            shown = shown.as_far_as_known(&matter);
+            shown = shown.up_to_where_known(&matter);
         }
         series.push(shown);
         notes.push(format!("{}: the body ends where {:.1e} of the light lies beyond", matter.model, matter.lost()));

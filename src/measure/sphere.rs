@@ -57,7 +57,7 @@ pub fn sphere(setup: &Setup) -> Result<Figure> {
         for ((c, name), points) in channels.into_iter().zip(points) {
             let radii = geometric(0.3 * path, 300.0 * path, 200);
             let curve = radii.into_iter().map(|radius| (radius, matter.profile(c).cdf(2.0 * radius))).collect();
-            means.push(Series { name, points, curve }.as_far_as_known(matter));
+            means.push(Series { name, points, curve }.up_to_where_known(matter));
         }
     }
     let by_radius = Panel {

@@ -164,7 +164,7 @@ fn csv(figure: &Figure) -> String {
             for point in &series.points {
                 let words = [&panel.name, &series.name, &panel.x.label].map(|word| quoted(word)).join(",");
                 let Point { x, measured, error, expected } = point;
-                let numbers = [*measured, *error, *expected, point.deviation()].map(|value| number(value)).join(",");
+                let numbers = [*measured, *error, *expected, point.deviation()].map(number).join(",");
                 // Text that cannot be written to a string does not exist.
                 let _ = writeln!(text, "{words},{x},{},{numbers}", quoted(&panel.y.label));
             }

@@ -71,7 +71,7 @@ pub fn svg(figure: &Figure) -> Result<String, Failed> {
 const CURVES: &str = "closed form";
 
 /// Words of the legend by lines: the place of each, and the series, none for the curves.
-fn legend<'a>(panel: &'a Panel) -> Vec<Vec<(u32, &'a str, Option<usize>)>> {
+fn legend(panel: &Panel) -> Vec<Vec<(u32, &str, Option<usize>)>> {
     let names = panel.series.iter().enumerate().map(|(index, series)| (series.name.as_str(), Some(index)));
     let curves = panel.series.iter().any(|series| !series.curve.is_empty()).then_some((CURVES, None));
     let mut lines = vec![vec![]];

@@ -223,7 +223,7 @@ pub(super) fn corners(item: &Item, order: &[u32], mode: usize, count: usize) -> 
         return Err(item.error(format!("index {place} is {}, but there are {count} vertices", order[place])));
     }
     Ok(match mode {
-        4 if order.len() % 3 != 0 => {
+        4 if !order.len().is_multiple_of(3) => {
             return Err(item.error(format!("{} vertices are no whole number of triangles", order.len())));
         }
         4 => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),

@@ -90,7 +90,7 @@ impl Context<'_> {
         let signed = |i: u32, k: u32| (2.0 * number(i, k) - 1.0) * magnitude(i, k + 20, 1e-6, 1e6);
         let operand = |i: u32| {
             let (x, y) = (signed(i, 1) as f32, signed(i, 2) as f32);
-            let z = if i % 2 == 0 { signed(i, 3) as f32 } else { -x * y * (1.0 + 1e-3 * number(i, 4) as f32) };
+            let z = if i.is_multiple_of(2) { signed(i, 3) as f32 } else { -x * y * (1.0 + 1e-3 * number(i, 4) as f32) };
             Vec3::new(x, y, z)
         };
         (0..self.share(INPUTS)).map(operand).collect()

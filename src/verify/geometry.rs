@@ -147,10 +147,11 @@ pub fn density(context: &mut Context) -> Result<Verdict> {
 fn rays(count: u32) -> Vec<Ray> {
     let ray = |i: u32| {
         let from = direction(i, 1) * 1.5 * number(i, 3);
-        let to = if i % 8 == 0 { from + DVec3::AXES[i as usize / 8 % 3] } else { direction(i, 4) * number(i, 6) };
+        let to =
+            if i.is_multiple_of(8) { from + DVec3::AXES[i as usize / 8 % 3] } else { direction(i, 4) * number(i, 6) };
         let offset = 1e-3 * direction(i, 7);
-        let reach = if i % 4 == 0 { 0.5 } else { 1e30 };
-        let t_min = if i % 3 == 0 { -reach } else { 0.0 };
+        let reach = if i.is_multiple_of(4) { 0.5 } else { 1e30 };
+        let t_min = if i.is_multiple_of(3) { -reach } else { 0.0 };
         Ray {
             base: from.as_vec3(),
             offset: offset.as_vec3(),
@@ -164,7 +165,7 @@ fn rays(count: u32) -> Vec<Ray> {
 
 /// Which of a scene's sets an invocation asks for.
 fn set_of(i: usize) -> u32 {
-    if i % 5 == 0 { 0 } else { u32::MAX }
+    if i.is_multiple_of(5) { 0 } else { u32::MAX }
 }
 
 /// Runs one mode of `traverse` on all rays; `entries` are the parts of the result.

@@ -59,7 +59,7 @@ fn world(model: u32, count: u32) -> World {
     let mut world = World { features, materials, shadings, profiles, ..World::default() };
     if model == MODEL_TABLE {
         // The curvature at each invocation: half-spaces, and spheres of many sizes.
-        let of = |i: u32| if i % 4 == 0 { 0.0 } else { magnitude(i, 30, 1e-2, 10.0) as f32 };
+        let of = |i: u32| if i.is_multiple_of(4) { 0.0 } else { magnitude(i, 30, 1e-2, 10.0) as f32 };
         world.thickness = (0..count).map(|i| Vec3::splat(of(i))).collect();
     }
     world

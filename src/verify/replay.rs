@@ -86,7 +86,7 @@ pub fn read(folder: &Path) -> Result<Dispatch> {
             return Err(about.wrong(format!("slots: {name} has the binding {} in this version", slot as u32)));
         }
         let size = about.number(entry, "bytes")? as usize;
-        if size == 0 || size % 4 != 0 {
+        if size == 0 || !size.is_multiple_of(4) {
             return Err(about.wrong(format!("slots: {name} has {size} bytes, must have whole words")));
         }
         if before.iter().any(|(other, _)| *other == slot) {

@@ -143,7 +143,8 @@ fn lights_of_equal_power_agree() {
     for ground_material in [matter([900.0; 3], [100.0; 3], 1.4), plaster()] {
         let name = if ground_material["extras"].is_null() { "reflection.G" } else { "subsurface.G" };
         let materials = [ground_material, lamp(radiance, false)];
-        let by_point = mean(&gltf(&[(ground.clone(), 0)], &materials, &[point.clone()], &eye), &settings, 256, name);
+        let by_point =
+            mean(&gltf(&[(ground.clone(), 0)], &materials, std::slice::from_ref(&point), &eye), &settings, 256, name);
         let both = [(ground.clone(), 0), (ball.clone(), 1)];
         let by_sphere = mean(&gltf(&both, &materials, &[], &eye), &settings, 256, name);
         let mut lit = scene(&gltf(&[(ground.clone(), 0)], &materials, &[], &eye));

@@ -38,7 +38,9 @@ fn inspect_lists_the_buffers_and_kernels_that_a_renderer_makes() {
     cube.cuboid(DVec3::NEG_ONE, DVec3::ONE, 1);
     let eye = Eye { eye: DVec3::new(0.0, 0.0, 5.0), at: DVec3::ZERO, lens: 0.6 };
     let light = (sun(), DVec3::Z, DVec3::ZERO);
-    let lit = |material: serde_json::Value| scene(&gltf(&[(cube.clone(), 0)], &[material], &[light.clone()], &eye));
+    let lit = |material: serde_json::Value| {
+        scene(&gltf(&[(cube.clone(), 0)], &[material], std::slice::from_ref(&light), &eye))
+    };
     let smooth = || lit(matter([1.0; 3], [0.1; 3], 1.3));
     let settings = Settings { resolution: Some((40, 30)), ..standard() };
 

@@ -51,14 +51,14 @@ fn pictures_from_uris_views_and_files() {
     let expected = Picture { width: 3, height: 2, texels: texels(&picture()) };
     let scene = load(&colored());
     assert_eq!(scene.warnings, Vec::<String>::new());
-    assert_eq!(scene.pictures, [expected.clone()]);
+    assert_eq!(scene.pictures, std::slice::from_ref(&expected));
     assert_eq!(texture(&scene, TEXTURE_BASE_COLOR), Texture::default());
 
     let png = encoded(&picture(), ImageFormat::Png);
     let mut in_view = colored();
     push_bytes(&mut in_view, &png, 5121, 1, "SCALAR");
     in_view["images"][0] = json!({"bufferView": 3, "mimeType": "image/png"});
-    assert_eq!(load(&in_view).pictures, [expected.clone()]);
+    assert_eq!(load(&in_view).pictures, std::slice::from_ref(&expected));
 
     let folder = std::env::temp_dir().join(format!("translucent-textures-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
