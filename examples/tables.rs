@@ -1,6 +1,6 @@
 //! Makes the tables that the crate ships: `cargo run --release --example tables [FOLDER]` (assets/tables by default).
 //!
-//! Some six minutes of one core. The same bytes result on every machine with the same elementary functions.
+//! Some seven minutes of one core. The same bytes result on every machine with the same elementary functions.
 
 use translucent::table::{SHIPPED_IORS, SPHERES, store::encode, white::White};
 

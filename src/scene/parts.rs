@@ -55,7 +55,7 @@ impl Scene {
     /// checked when a renderer is made.
     ///
     /// The BVH over the triangles is built on the host. Vertices that only a buffer of the device holds have to be read
-    /// back by the caller: that is the one copy that he makes.
+    /// back by the caller, once.
     ///
     /// # Errors
     /// [`Error::Scene`] that names the mesh and what it breaks: an index beyond its vertices, arrays of other lengths,

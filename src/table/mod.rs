@@ -27,36 +27,29 @@ pub mod white;
 use crate::reference::profile::Coefficients;
 use block::Channel;
 use std::collections::HashMap;
-use std::sync::{Arc, LazyLock, Mutex};
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 use white::White;
 
 /// Indices of refraction of the tables that the crate ships.
-pub const SHIPPED_IORS: [f64; 5] = [1.0, 1.3, 1.33, 1.4, 1.5];
+pub const SHIPPED_IORS: [f64; 6] = [1.0, 1.3, 1.33, 1.4, 1.45, 1.5];
 
 /// Radii of the tabulated spheres: 2 a = 2^(i/2) / sigma_s' for each number i.
 pub const SPHERES: [i32; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16];
 
-const SHIPPED: [&[u8]; 5] = [
+const SHIPPED: [&[u8]; SHIPPED_IORS.len()] = [
     include_bytes!("../../assets/tables/1.table"),
     include_bytes!("../../assets/tables/1.3.table"),
     include_bytes!("../../assets/tables/1.33.table"),
     include_bytes!("../../assets/tables/1.4.table"),
+    include_bytes!("../../assets/tables/1.45.table"),
     include_bytes!("../../assets/tables/1.5.table"),
 ];
 
 /// The shipped table of an index of refraction.
 pub fn shipped(index: usize) -> Arc<White> {
-    static TABLES: [LazyLock<Arc<White>>; 5] = [
-        LazyLock::new(|| read(0)),
-        LazyLock::new(|| read(1)),
-        LazyLock::new(|| read(2)),
-        LazyLock::new(|| read(3)),
-        LazyLock::new(|| read(4)),
-    ];
-    fn read(index: usize) -> Arc<White> {
-        Arc::new(store::decode(SHIPPED[index]).expect("the shipped tables are whole"))
-    }
-    TABLES[index].clone()
+    static TABLES: [OnceLock<Arc<White>>; SHIPPED_IORS.len()] = [const { OnceLock::new() }; SHIPPED_IORS.len()];
+    let read = || Arc::new(store::decode(SHIPPED[index]).expect("the shipped tables are whole"));
+    TABLES[index].get_or_init(read).clone()
 }
 
 /// The shipped tables around an index of refraction, with their weights.

@@ -200,7 +200,7 @@ fn near_emitters_agree_with_the_integrator() {
         };
         for (point, normal) in [(DVec3::new(-0.5, 0.1, 1.0), DVec3::Z), (DVec3::new(0.3, 1.0, 0.4), DVec3::Y)] {
             let eye = Eye { eye: point + 4.0 * normal + DVec3::new(-2.0, 0.5, 0.3), at: point, lens: 1e-4 };
-            let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 20, 11);
+            let expected = leaving(&setting, point, normal, (eye.eye - point).normalize(), 1 << 19, 11);
             let meshes = [(cube.clone(), 0), (quad.clone(), 1), (wall.clone(), 2)];
             let black = json!({"pbrMetallicRoughness": {"baseColorFactor": [0.0, 0.0, 0.0, 1.0]}});
             let materials = [matter(sigma_s, sigma_a, ior), lamp(5.0, two_sided), black];
