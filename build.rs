@@ -23,6 +23,7 @@ fn main() {
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     options.set_target_spirv(shaderc::SpirvVersion::V1_6);
     options.set_generate_debug_info();
+    options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     options.set_warnings_as_errors();
     options.set_include_callback(|name, _, _, _| {
         let content = match name {

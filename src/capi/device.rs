@@ -245,7 +245,8 @@ pub struct TranslucentDeviceInfo {
     /// What the device was made with, so that a missing feature is named and VK_EXT_external_memory_host used where it
     /// is enabled; null: the caller is trusted.
     pub created_with: *const VkDeviceCreateInfo,
-    /// Used for every pipeline; may be null.
+    /// Used for every pipeline, from several threads at once, so not VK_PIPELINE_CACHE_CREATE_EXTERNALLY_SYNCHRONIZED;
+    /// may be null.
     pub pipeline_cache: VkPipelineCache,
     /// VK_TRUE if VK_EXT_debug_utils is enabled in the instance: objects get names and dispatches labels.
     pub debug_utils: VkBool32,

@@ -68,7 +68,8 @@ pub struct RawDevice<'a> {
     pub debug_utils: bool,
     /// Where device memory comes from; without it an allocator of our own.
     pub allocator: Option<Arc<dyn Allocator>>,
-    /// Used for every pipeline; may be null.
+    /// Used for every pipeline, from several threads at once, so not VK_PIPELINE_CACHE_CREATE_EXTERNALLY_SYNCHRONIZED;
+    /// may be null.
     pub pipeline_cache: vk::PipelineCache,
 }
 

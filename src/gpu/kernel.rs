@@ -246,14 +246,13 @@ impl Kernel {
         features: &Features,
         workgroup: u32,
     ) -> Result<Kernel> {
-        let mut compiled = lock(&device.kernels);
         let key = (spirv, *features, workgroup);
-        if let Some(kernel) = compiled.get(&key) {
+        if let Some(kernel) = lock(&device.kernels).get(&key) {
             return Ok(kernel.clone());
         }
+        // Not locked meanwhile: kernels compile side by side.
         let kernel = Kernel::new(&Layout::new(device)?, stem, spirv, features, workgroup)?;
-        compiled.insert(key, kernel.clone());
-        Ok(kernel)
+        Ok(lock(&device.kernels).entry(key).or_insert(kernel).clone())
     }
 
     /// The name that it shares with its GLSL file and its twin.

@@ -24,6 +24,7 @@ use crate::{
     timeline::{self, Work},
 };
 use bands::Band;
+use rayon::prelude::*;
 use std::{
     ops::{ControlFlow, Range},
     time::{Duration, Instant},
@@ -44,17 +45,13 @@ macro_rules! kernels {
         struct Kernels { $($stem: Option<Kernel>,)* }
 
         impl Kernels {
+            /// Side by side: a driver translates each on one core.
             fn new(device: &Device, prepared: &Prepared, workgroup: u32) -> Result<Kernels> {
-                Ok(Kernels { $($stem: match plan::needs(prepared, stringify!($stem)).0 {
-                    true => Some(Kernel::shared(
-                        device,
-                        stringify!($stem),
-                        include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv")),
-                        &prepared.features,
-                        workgroup,
-                    )?),
-                    false => None,
-                },)* })
+                let mut made = SPIRV.par_iter().map(|&(stem, spirv)| match plan::needs(prepared, stem).0 {
+                    true => Kernel::shared(device, stem, spirv, &prepared.features, workgroup).map(Some),
+                    false => Ok(None),
+                }).collect::<Result<Vec<_>>>()?.into_iter();
+                Ok(Kernels { $($stem: made.next().expect("one for each"),)* })
             }
 
             fn made(&self) -> impl Iterator<Item = &Kernel> {
