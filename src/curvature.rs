@@ -39,6 +39,8 @@ pub fn reach(diffuse: f64, reduced: f64) -> f64 {
 /// Directions from a point: at most and at least, and how many rays a scene may cost between them.
 const DIRECTIONS: (usize, usize) = (64, 16);
 const RAYS: usize = 4_000_000;
+/// Triangles up to which each is looked at from three points within it; beyond, their neighbours are near.
+const FEW: usize = 1 << 10;
 /// Distance, over L, beyond which a surface is out of sight: e^(-20/2) = 5e-5.
 const SIGHT: f64 = 20.0;
 /// Vertices closer than an internal unit over this are one.
@@ -47,14 +49,15 @@ const GRID: f64 = (1 << 20) as f64;
 /// 1 / a [1/internal unit] at the three vertices of each triangle, in their order; a set's entry of `lengths` is its L (>
 /// 0; it may be infinite). A set without one has 0.
 ///
-/// Rays start from three points of each triangle, at its own normal; a vertex has the mean of the triangles around it. A
-/// ray that finds no surface counts as unbounded, so open meshes are surfaces of matter that goes on behind them.
+/// Rays start from three points of each triangle, of one alone where there are many, at its own normal; a vertex has the
+/// mean of the triangles around it. A ray that finds no surface counts as unbounded, so open meshes are surfaces of matter
+/// that goes on behind them.
 pub fn inverse_radii(triangles: &[Triangle], lengths: &[Option<f64>]) -> Vec<Vec3> {
     let mut sets: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
         sets.entry(triangle.set).or_default().push(index);
     }
-    let directions = (RAYS / (3 * triangles.len().max(1))).clamp(DIRECTIONS.1, DIRECTIONS.0);
+    let directions = (RAYS / triangles.len().max(1)).clamp(DIRECTIONS.1, DIRECTIONS.0);
     let mut radii = vec![Vec3::ZERO; triangles.len()];
     for (set, members) in sets {
         let Some(length) = lengths[set as usize].map(|length| length.min(1e6)) else { continue };
@@ -77,11 +80,14 @@ pub fn of_mesh(corners: &[Corners], length: f64, directions: usize) -> Vec<Vec3>
     let near = |index: usize| {
         let [a, b, c] = corners[index];
         let (_, normal, _) = mesh.facet(index);
-        let of = |corner: DVec3| inverse_radius(&mesh, (a + b + c) / 6.0 + corner / 2.0, normal, length, directions);
-        [of(a), of(b), of(c)]
+        let middle = (a + b + c) / 3.0;
+        let of = |point: DVec3| DVec3::splat(inverse_radius(&mesh, point, normal, length, directions));
+        if corners.len() > FEW {
+            return [of(middle); 3];
+        }
+        [a, b, c].map(|corner| of((middle + corner) / 2.0))
     };
-    let found: Vec<[DVec3; 3]> =
-        (0..corners.len()).into_par_iter().map(|index| near(index).map(DVec3::splat)).collect();
+    let found: Vec<[DVec3; 3]> = (0..corners.len()).into_par_iter().map(near).collect();
     let vertices = Vertices::new(corners, &found);
     corners.iter().map(|triangle| Vec3::from(triangle.map(|corner| vertices.mean(corner).x as f32))).collect()
 }

@@ -24,7 +24,7 @@
 //! by up to 5 % where the ring at a small sphere's diameter, which holds the light that crosses it straight, ends on the
 //! body (tests/physics/balance.rs).
 
-use super::Vertices;
+use super::{FEW, Vertices};
 use crate::reference::profile::table::Local;
 use crate::reference::walk::mesh::Corners;
 use glam::{DVec3, Vec3};
@@ -34,8 +34,6 @@ use std::f64::consts::{FRAC_PI_3, TAU};
 
 /// Radius of a group over its distance below which its centre stands for it.
 pub const OPENING: f64 = 0.4;
-/// Triangles up to which each is looked at from three points within it; beyond, from its vertices, which are fewer.
-const FEW: usize = 1 << 10;
 
 /// The balance of each channel at the three vertices of each triangle of one body.
 ///
@@ -56,6 +54,7 @@ pub fn of_mesh<'a>(
         if open { balance.min(DVec3::ONE) } else { balance }
     };
     if corners.len() > FEW {
+        // From its vertices, which are fewer.
         let mut places: HashMap<_, (DVec3, f64)> = HashMap::new();
         for (triangle, curvatures) in corners.iter().zip(curvatures) {
             for (corner, curvature) in triangle.iter().zip(curvatures.to_array()) {
