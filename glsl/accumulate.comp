@@ -14,6 +14,7 @@
 #include "sums.glsl"
 SHADINGS(readonly);
 #include "emitter.glsl"
+#include "arriving.glsl"
 SURFACES(readonly);
 PROBES(readonly);
 HIT_LISTS(readonly);
@@ -63,12 +64,6 @@ vec3 directed(Material m, Seen s, vec3 delta, vec3 ni, vec3 wi, float shift) {
     return 0.5 * (value + directional_value(m, delta, s.shading_normal, s.wo, ni, shift));
 }
 
-// Density per solid angle of the directions that are drawn: the cosine, or half of it and half of the image's.
-float direction_density(View view, vec3 direction, float c) {
-    if (ENVIRONMENT_KIND != ENVIRONMENT_IMAGE) return 1.0 / PI * c;
-    return 0.5 * environment_density(view, direction) + 0.5 / PI * c;
-}
-
 void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
@@ -81,6 +76,8 @@ void main() {
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
     if ((m.flags & TRANSLUCENT) == 0u) return;
+    // Of all other matter light is gathered.
+    if (INTEGRATOR == INTEGRATOR_CLOUD && !has_model(m, MODEL_LAMBERT)) return;
     if (MIXED != 0) {
         m.camera_rate = mixture_at(surface).camera_rate;
     } else if (has_model(m, MODEL_TABLE)) {
@@ -151,60 +148,12 @@ void main() {
     float entry_share = roughness_share(lit, barycentric);
 
     vec3 entering = vec3(0.0);
-    uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
     for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
         vec3 direction;
-        float distance = 1e30;
-        vec3 light;
-        uint target = MISS;
-        float directional = 0.0;
-        if (k < view.light_count) {
-            Incoming incoming = delta_light(k, position);
-            direction = incoming.direction;
-            distance = incoming.distance;
-            light = incoming.irradiance * max(dot(shading_n, direction), 0.0);
-        } else if (EMISSIVE != 0 && k < first_direction) {
-            uint j = k - view.light_count;
-            vec2 u = random_point(key, batch, DIM_EMITTER, sample_index() / BATCHES * view.directions + j);
-            EmitterPoint point = draw_emitter(view, position, n * SHADOW_OFFSET, u);
-            direction = point.direction;
-            distance = point.distance * EMITTER_REACH;
-            target = point.triangle;
-            float c = max(dot(shading_n, direction), 0.0);
-            directional = direction_density(view, direction, c);
-            light = combined(emitted(target, point.barycentric, direction), point.density, point.distance, target,
-                direction, directional) * (c / float(view.directions));
-        } else {
-            uint j = k - first_direction;
-            vec2 u = random_point(key, batch, DIM_LIGHT, sample_index() / BATCHES * view.directions + j);
-            // The image and the cosine, half of the directions each, combined by the balance heuristic.
-            bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
-            if (image && u.x < 0.5) {
-                direction = draw_environment(view, vec2(2.0 * u.x, u.y));
-            } else {
-                direction = draw_cosine(shading_n, vec2(image ? 2.0 * u.x - 1.0 : u.x, u.y));
-            }
-            float c = max(dot(shading_n, direction), 0.0);
-            directional = direction_density(view, direction, c);
-            float over_density = image ? c / directional : PI;
-            light = c > 0.0 ? environment_radiance(view, direction) * (over_density / float(view.directions)) : vec3(0.0);
-        }
-        float cos_shading = dot(shading_n, direction);
-        bool open = dot(n, direction) > 0.0 && cos_shading > 0.0
-            && (EMISSIVE != 0 && k >= first_direction || light.x + light.y + light.z > 0.0);
-        traverse(Ray(position, n * SHADOW_OFFSET, direction, 0.0, open ? distance : -1.0),
-            EMISSIVE != 0 ? CLOSEST : ANY, EVERY_SET, 0u);
-        if (EMISSIVE != 0 && open && hit_count != 0u) {
-            uint found = hit_triangle[0];
-            if (k >= first_direction) {
-                light = combined(emitted(found, hit_barycentric, direction), emitter_density(view, found), hit_t[0],
-                    found, direction, directional) * (cos_shading / float(view.directions));
-            }
-            if (k >= first_direction || found == target) hit_count = 0u;
-        }
-        if (open && hit_count == 0u) {
-            light *= crossing(local, cos_shading, entry_share);
-            light *= obliqueness(local, cos_shading, false);
+        vec3 light = arriving(view, k, position, n, shading_n, key, batch, sample_index() / BATCHES, direction);
+        if (light != vec3(0.0)) {
+            light *= crossing(local, dot(shading_n, direction), entry_share);
+            light *= obliqueness(local, dot(shading_n, direction), false);
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }

@@ -23,6 +23,11 @@ uint sample_point(uint dimension) {
     return RECORDED != 0 ? samples[step_.sample_index].point[dimension] : step_.point[dimension];
 }
 
+// Consecutive samples of a batch that share a sub-pixel stratum: gathering is the same in all of it.
+uint stratum_samples() {
+    return INTEGRATOR == INTEGRATOR_CLOUD ? 1u : STRATUM;
+}
+
 // Where the pixel's surface of the current sample is: each batch has a G-buffer. Pixels' centres go to the first.
 uint surface_index(uint index) {
     uint batch = step_.pixel_centre != 0 ? 0u : sample_index() % BATCHES;

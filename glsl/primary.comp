@@ -13,12 +13,12 @@ void main() {
     if (index >= step_.pixel_count) return;
     // A recording traces the strata of its first samples, whatever they are, and then each where it starts.
     if (RECORDED != 0 && step_.pixel_centre == 0 && step_.sample_index >= BATCHES
-        && sample_index() / BATCHES % STRATUM != 0u) return;
+        && sample_index() / BATCHES % stratum_samples() != 0u) return;
     View view = views[0];
     uvec2 pixel = pixel_position(view, index);
     vec2 within = vec2(0.5);
     if (step_.pixel_centre == 0) {
-        uint stratum = sample_index() / BATCHES / STRATUM;
+        uint stratum = sample_index() / BATCHES / stratum_samples();
         within = random_point(pixel_key(view.seed, pixel), sample_index() % BATCHES, DIM_PIXEL, stratum);
     }
     vec2 ndc = 2.0 * (vec2(pixel) + within) / vec2(view.width, view.height) - 1.0;

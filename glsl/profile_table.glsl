@@ -150,10 +150,14 @@ vec3 table_slope(Material m) {
     return slope;
 }
 
+// 1 - cosine of refraction, of light at the cosine outside.
+float table_oblique(Material m, float c) {
+    return 1.0 - sqrt(max(1.0 - (1.0 - c * c) / (m.ior * m.ior), 0.0));
+}
+
 // Factor on light that enters, or leaves, at the cosine outside.
 vec3 table_obliqueness(Material m, vec3 slope, float c, bool leaving) {
-    float inside = sqrt(max(1.0 - (1.0 - c * c) / (m.ior * m.ior), 0.0));
-    vec3 factor = 1.0 + slope * (1.0 - inside);
+    vec3 factor = 1.0 + slope * table_oblique(m, c);
     return leaving ? factor / (1.0 + slope * m.obliqueness) : factor;
 }
 

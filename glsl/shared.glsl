@@ -39,10 +39,21 @@ const uint ROUGHNESS_ROWS = 33u;
 const float OPAQUE_ALPHA_MIN = 0.001;
 // Most media of one set of surfaces that exchange light.
 const uint MAX_MEMBERS = 8u;
+// Points below one node of the cloud that `gather` starts from at most, so that it stays below Mesa 22's cap of 65,535
+// loop trips whatever it opens.
+const uint GATHER_POINTS = 4096u;
+// Row that stands for the points of the cloud in the keys of random numbers, in which pixels have their own.
+const uint POINTS_ROW = 4294967295u;
+// Value of `Cluster::set` where points of several sets lie below it.
+const uint SEVERAL = 4294967295u;
 // Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
 const uint BVH_DEPTH = 24u;
 // Value of `Surface::triangle` for a ray that hits nothing.
 const uint MISS = 4294967295u;
+// Integrator: probes, whose hits are lit.
+const uint INTEGRATOR_SAMPLE = 0u;
+// Integrator: points on the surface are lit once, and each pixel gathers from them.
+const uint INTEGRATOR_CLOUD = 1u;
 // Projection: all techniques combined by the balance heuristic.
 const uint PROJECTION_MIS = 0u;
 // Projection: the camera ray alone, first hit, as the method was given.
@@ -255,6 +266,8 @@ layout(constant_id = 10) const uint CURVATURE = 0;
 layout(constant_id = 20) const uint RECORDED = 0;
 // 1 where a set holds several materials.
 layout(constant_id = 11) const uint MIXED = 0;
+// One of INTEGRATOR_*.
+layout(constant_id = 12) const uint INTEGRATOR = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -288,6 +301,10 @@ struct View {
     uint emitter_count;
     // 1 to add the environment where a camera ray hits nothing.
     uint show_environment;
+    // Leaves of the cloud's tree, a power of two.
+    uint leaves;
+    // Radius over distance below which a cluster's centre stands for its points.
+    float opening;
     // Constant radiance, or the factor on the image's.
     vec3 environment_scale;
     // World direction to image direction: rows of a rotation.
@@ -317,14 +334,19 @@ struct Step {
     uint ray_begin;
     // Shadow rays of this dispatch; 0 where the scene has no light.
     uint ray_count;
-    // 1 in the sample's first dispatch of `reflect`, which also adds what does not depend on shadow rays.
+    // 1 in the sample's first dispatch of `reflect`, which also adds what does not depend on shadow rays, and of
+    // `gather`, which begins its sums.
     uint first;
+    // 1 in the sample's last dispatch of `gather`.
+    uint last;
     // 1 in the sample's first dispatch of all that add to the sums: it counts the sample.
     uint count;
-    // First sample of the whole range that is in the sums, for `resolve`.
+    // First sample of the whole range that is in the sums, for `resolve`; of those that light the cloud.
     uint range_begin;
     // End of that range.
     uint range_end;
+    // Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from.
+    uint node;
     // The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
     uint point[5];
 };
@@ -436,6 +458,8 @@ struct Material {
     uint ramp;
     // 1 + the number of its table in Boundaries; 0 for a smooth boundary.
     uint boundary;
+    // Cloud: radius within which light is interpolated between points.
+    float reach;
     // Where sets hold several materials: what strength and beam leave out and the exit's material brings, its tint over
     // pi (1 - rho_e).
     vec3 exit;
@@ -445,6 +469,42 @@ struct Material {
 struct Balance {
     // At the three vertices.
     vec3 at[3];
+};
+
+// A point of the cloud (a leaf), or what the points below a node of its tree have in common.
+struct Cluster {
+    // Of several points, the mean by flux.
+    vec3 position;
+    // Geometric normal, of several points the mean by flux; 0 where they have none.
+    vec3 normal;
+    // Distance within which all of its points are.
+    float radius;
+    // Mean squared distance of its points from that, by flux.
+    float spread;
+    // Flux that enters: of table models, at slope 0.
+    vec3 flux;
+    // Flux times 1 - cosine of refraction, which the slope of table models multiplies.
+    vec3 oblique;
+    // Area that its points stand for; 0 for a leaf without a point.
+    float area;
+    // Near mass times area.
+    vec3 mass;
+    // The set that they belong to, or SEVERAL.
+    uint set;
+    // Of a leaf: its triangle, and the weights of the second and third vertex.
+    uint triangle;
+    vec2 barycentric;
+};
+
+// What a pixel has gathered so far.
+struct Gather {
+    // From afar.
+    vec3 far;
+    // Weighted light and weights of the points that are near.
+    vec3 near;
+    vec3 weight;
+    // Weighted near masses.
+    vec3 mass;
 };
 
 // The media of a set of several materials.
@@ -629,5 +689,9 @@ struct Pixel {
 #define MIXTURES(access) layout(set = 0, binding = 26, scalar) access buffer MixturesBlock { Mixture mixtures[]; }
 // Balances of each triangle, once for as many materials as its set has.
 #define BALANCES(access) layout(set = 0, binding = 27, scalar) access buffer BalancesBlock { Balance balances[]; }
+// The cloud's tree: node i has the children 2 i and 2 i + 1, the leaves are the second half; node 0 is none.
+#define CLUSTERS(access) layout(set = 0, binding = 28, scalar) access buffer ClustersBlock { Cluster clusters[]; }
+// One per pixel of the band, where a cloud is gathered by several dispatches.
+#define GATHERS(access) layout(set = 0, binding = 29, scalar) access buffer GathersBlock { Gather gathers[]; }
 
 layout(push_constant, scalar) uniform StepBlock { Step step_; };

@@ -1,5 +1,6 @@
 //! A scene and settings become what kernels read: f64 metres in, shared structs in internal units out.
 
+mod cloud;
 mod matter;
 mod sets;
 
@@ -13,8 +14,10 @@ use crate::{
     model::{self, Advice, Detail},
     reference::{Inputs, emitter, light, texture},
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Scene, Wrap},
-    settings::{Directional, Settings},
-    shared::{self, Balance, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, Texture, View},
+    settings::{Directional, Integrator, Settings},
+    shared::{
+        self, Balance, Cluster, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, Texture, View,
+    },
 };
 use glam::Vec3;
 
@@ -42,6 +45,8 @@ pub struct Prepared {
     pub balances: Vec<Balance>,
     /// Media of each set, none where no set holds several materials.
     pub mixtures: Vec<Mixture>,
+    /// The cloud's tree, not lit yet; none without light that is gathered.
+    pub clusters: Vec<Cluster>,
     /// The model of each material and why it; none for opaque ones.
     pub advice: Vec<Option<Advice>>,
     /// The camera that looks, for what is said about the image.
@@ -165,7 +170,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         Some(Before { prepared, .. }) => Matter::of(prepared),
         None => Matter::new(scene, settings, &advice)?,
     };
-    let Matter { materials, profiles, boundaries, rough_rows, thickness, balances, mixtures } = matter;
+    let Matter { materials, profiles, boundaries, rough_rows, thickness, balances, mixtures, clusters } = matter;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
@@ -176,6 +181,8 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     view.directions = settings.directions;
     view.light_count = lights.len() as u32;
     view.emitter_count = emitters.len() as u32;
+    view.leaves = clusters.len() as u32 / 2;
+    view.opening = settings.cloud.opening as f32;
     view.show_environment = u32::from(settings.show_environment);
 
     let map = &scene.environment;
@@ -222,6 +229,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         curvature: u32::from(!thickness.is_empty()),
         recorded: u32::from(settings.recording),
         mixtures: u32::from(!mixtures.is_empty()),
+        integrator: settings.integrator as u32,
         ..Features::default()
     };
     Ok(Prepared {
@@ -230,7 +238,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         has_single: materials.iter().any(|material| material.scattering != Vec3::ZERO),
         materials,
         has_translucent: models != 0,
-        has_probes: models & !(1 << MODEL_LAMBERT) != 0,
+        has_probes: models & !(1 << MODEL_LAMBERT) != 0 && settings.integrator == Integrator::Sample,
         has_reflection: opaque
             || emits
             || settings.show_environment
@@ -249,6 +257,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         thickness,
         balances,
         mixtures,
+        clusters,
         advice,
         camera,
         rows: y0..y1,

@@ -127,6 +127,22 @@ impl<'a> Tree<'a> {
         self.groups[place].next = self.groups.len() as u32;
     }
 
+    /// The triangles of which a part may be within `radius` of `point`.
+    pub fn near(&self, point: DVec3, radius: f64) -> impl Iterator<Item = &Corners> {
+        let mut place = 0;
+        std::iter::from_fn(move || {
+            loop {
+                let group = self.groups.get(place)?;
+                let far = group.centre.distance(point) - group.radius > radius;
+                let one = group.next as usize == place + 1;
+                place = if far { group.next as usize } else { place + 1 };
+                if one && !far {
+                    return Some(&self.corners[group.triangle as usize]);
+                }
+            }
+        })
+    }
+
     /// The integral of a profile, centred at `point`, over all triangles.
     pub fn integral(&self, profile: &Local, point: DVec3, length: f64) -> DVec3 {
         let end = profile.end();
@@ -143,7 +159,8 @@ impl<'a> Tree<'a> {
                 place = group.next as usize;
             } else {
                 if one {
-                    sum += triangle(profile, point, &self.corners[group.triangle as usize]);
+                    let corners = &self.corners[group.triangle as usize];
+                    sum += triangle(&|squared| profile.inside(squared), point, corners);
                 }
                 place += 1;
             }
@@ -152,14 +169,14 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// The integral over one triangle.
-fn triangle(profile: &Local, point: DVec3, corners: &Corners) -> DVec3 {
+/// The integral over one triangle of a profile, of which `inside` is the mass within a squared distance.
+pub fn triangle(inside: &impl Fn(f64) -> DVec3, point: DVec3, corners: &Corners) -> DVec3 {
     let [a, b, c] = *corners;
     let Some(normal) = (b - a).cross(c - a).try_normalize() else { return DVec3::ZERO };
     let height = (point - a).dot(normal);
     let foot = point - height * normal;
     let squared = height * height;
-    let within = profile.inside(squared);
+    let within = inside(squared);
     let edge = |from: DVec3, to: DVec3| {
         let along = (to - from).normalize();
         let (u, v) = (from - foot, to - foot);
@@ -172,7 +189,7 @@ fn triangle(profile: &Local, point: DVec3, corners: &Corners) -> DVec3 {
         let (begin, end) = (angle(u), angle(v));
         let part = integral(begin, end, |phi| {
             let rho = away / phi.cos();
-            profile.inside(squared + rho * rho) - within
+            inside(squared + rho * rho) - within
         });
         part * away.signum() / TAU
     };

@@ -1,6 +1,6 @@
 //! Materials as kernels read them, with all that their matter brings: profiles, rough boundaries, curvatures, mixtures.
 
-use super::{Before, Prepared, sets};
+use super::{Before, Prepared, cloud, sets};
 use crate::{
     error::{Error, Result},
     model::{self, Advice, Choice},
@@ -12,8 +12,8 @@ use crate::{
         texture,
     },
     scene::{self, Frame, Medium, Scene},
-    settings::{Model, Projection, Settings},
-    shared::{self, Balance, Material, Mixture, TWO_SIDED},
+    settings::{Integrator, Model, Projection, Settings},
+    shared::{self, Balance, Cluster, Material, Mixture, TWO_SIDED},
 };
 use glam::{DVec3, Vec3};
 
@@ -27,6 +27,7 @@ pub(super) struct Matter {
     pub thickness: Vec<Vec3>,
     pub balances: Vec<Balance>,
     pub mixtures: Vec<Mixture>,
+    pub clusters: Vec<Cluster>,
 }
 
 impl Matter {
@@ -36,8 +37,13 @@ impl Matter {
         let mut materials = materials(scene, settings, advice, &thickness, &mut profiles, &mut boundaries)?;
         let balances = sets::balances(scene, &mut materials, &profiles, &thickness);
         let mixtures = sets::mixtures(scene, &materials)?;
+        let clusters = match settings.integrator {
+            Integrator::Cloud => cloud::clusters(scene, settings, &mut materials, &profiles, &thickness)?,
+            Integrator::Sample => vec![],
+        };
         let rough_rows = boundaries.feature();
-        Ok(Matter { materials, profiles, boundaries: boundaries.values, rough_rows, thickness, balances, mixtures })
+        let boundaries = boundaries.values;
+        Ok(Matter { materials, profiles, boundaries, rough_rows, thickness, balances, mixtures, clusters })
     }
 
     /// The same as before.
@@ -50,6 +56,7 @@ impl Matter {
             thickness: prepared.thickness.clone(),
             balances: prepared.balances.clone(),
             mixtures: prepared.mixtures.clone(),
+            clusters: prepared.clusters.clone(),
         }
     }
 }
@@ -151,6 +158,9 @@ pub(crate) fn replaced(
     }
     if choice.as_ref().is_some_and(|choice| choice.limit_of == Model::Table) {
         return refuse("the table model's profile is made for its matter");
+    }
+    if translucent && !prepared.clusters.is_empty() {
+        return refuse("the cloud's near masses are made for its matter");
     }
     if translucent && prepared.features.mixtures != 0 {
         return refuse("its medium is one of several that exchange light");

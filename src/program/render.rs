@@ -17,7 +17,9 @@ use std::{
 };
 use translucent::{
     Device, DeviceOptions, Error, Image, Renderer, Settings,
+    gpu::leave,
     image::{Attribute, check_writable},
+    settings::Integrator,
     shared::BATCHES,
     timeline::{Timeline, begin},
 };
@@ -35,9 +37,10 @@ pub struct Render {
     /// The EXR file to write; without it the scene's name with .exr, in the current folder.
     #[arg(short, long, value_name = "OUT.exr")]
     output: Option<PathBuf>,
-    /// Samples of each pixel; A:B renders samples A to B-1, a part that `merge` puts together with others.
-    #[arg(long, value_name = "M|A:B", default_value = "64", value_parser = arguments::samples)]
-    samples: Range<u32>,
+    /// Samples of each pixel, 64 or, of a cloud, 8; A:B renders samples A to B-1, a part that `merge` puts together with
+    /// others.
+    #[arg(long, value_name = "M|A:B", value_parser = arguments::samples)]
+    samples: Option<Range<u32>>,
     /// How surfaces are found: rays traced through the scene.
     #[arg(long, default_value = "trace", value_parser = ["trace"])]
     reproject: String,
@@ -94,7 +97,7 @@ impl Render {
             Device::open(&options)
         };
         let (_, (finished, seconds, samples, mut image)) = renderer.with_recovery(&scene, reopen, |renderer| {
-            let finished = renderer.render_rest(self.samples.clone(), &mut |progress| {
+            let finished = renderer.render_rest(self.samples(), &mut |progress| {
                 if bar.length() != Some(progress.total) {
                     bar.set_length(progress.total);
                 }
@@ -161,9 +164,16 @@ impl Render {
     fn settings(&self) -> Settings {
         Settings {
             seed: self.seed,
-            variance: self.wants("variance") && self.samples.len() >= BATCHES as usize,
+            variance: self.wants("variance") && self.samples().len() >= BATCHES as usize,
             ..self.scene.settings()
         }
+    }
+
+    fn samples(&self) -> Range<u32> {
+        self.samples.clone().unwrap_or(match self.scene.integrator {
+            Integrator::Sample => 0..64,
+            Integrator::Cloud => 0..8,
+        })
     }
 
     fn wants(&self, layer: &str) -> bool {
@@ -181,7 +191,7 @@ impl Render {
         if self.quiet {
             return ProgressBar::hidden();
         }
-        let samples = self.samples.len();
+        let samples = self.samples().len();
         // Computed from the position, so that a line never shows two moments.
         let status = move |state: &ProgressState, out: &mut dyn fmt::Write| {
             let done = state.pos() as f64;
@@ -203,7 +213,7 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
     let flag = stop.clone();
     ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
+            leave(1);
         }
         eprintln!("interrupted: writing what there is (again to abort)");
     })

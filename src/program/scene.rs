@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
-    settings::Directional,
+    settings::{Cloud, Directional, Integrator},
     timeline::Timeline,
 };
 
@@ -25,6 +25,20 @@ pub struct SceneOptions {
     /// Incoming directions of the environment at each sampled position.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     directions: u32,
+    /// What computes the light that comes out of matter: probes of each pixel (sample), or points on the surface that are lit
+    /// once and gathered from (cloud), which leaves no noise.
+    #[arg(long, default_value = "sample", value_parser = integrators())]
+    pub integrator: Integrator,
+    /// Most points of the cloud.
+    #[arg(long, value_name = "N", default_value_t = Cloud::default().points,
+          value_parser = clap::value_parser!(u32).range(1..=Cloud::POINTS_MAX as i64))]
+    cloud_points: u32,
+    /// Size over distance below which points of the cloud count together, 0 to 1; 0 counts each.
+    #[arg(long, value_name = "X", default_value_t = Cloud::default().opening, value_parser = arguments::not_negative)]
+    cloud_opening: f64,
+    /// Samples that light each point of the cloud.
+    #[arg(long, value_name = "M", default_value_t = Cloud::default().samples, value_parser = clap::value_parser!(u32).range(1..))]
+    cloud_samples: u32,
     /// How a sampled point is carried to the surface: all techniques combined, the camera ray alone (biased), the
     /// normal axis alone.
     #[arg(long, default_value = "mis", value_parser = projections())]
@@ -80,6 +94,13 @@ pub struct SceneOptions {
     /// Render these pixels only; X1 and Y1 are exclusive.
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = arguments::crop)]
     crop: Option<[u32; 4]>,
+}
+
+fn integrators() -> impl TypedValueParser<Value = Integrator> {
+    PossibleValuesParser::new(Integrator::NAMES.map(|(_, name)| name)).map(|name| match name.as_str() {
+        "cloud" => Integrator::Cloud,
+        _ => Integrator::Sample,
+    })
 }
 
 fn projections() -> impl TypedValueParser<Value = Projection> {
@@ -166,6 +187,8 @@ impl SceneOptions {
             camera: self.camera.clone().unwrap_or_default(),
             crop: self.crop,
             directions: self.directions,
+            integrator: self.integrator,
+            cloud: Cloud { points: self.cloud_points, opening: self.cloud_opening, samples: self.cloud_samples },
             projection: self.projection,
             normalisation: self.normalisation,
             model: self.model,

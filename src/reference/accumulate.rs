@@ -34,16 +34,15 @@ use super::sample::coordinate;
 use super::sums::Contribution;
 use super::{Inputs, emitter, intersect, mixture, texture};
 use crate::shared::{
-    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, MAX_HITS, MISS,
+    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_CLOUD, MAX_HITS, MISS,
     MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
     TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// Coordinates of direction or emitter's point `j` of the step's sample.
-pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, dimension: u32) -> (f64, f64) {
-    let (px, py) = position(inputs.view, step, index);
+/// Coordinates of direction or emitter's point `j` of the step's sample, at the pixel in that column and row.
+pub(super) fn direction_point(inputs: &Inputs, step: &Step, (px, py): Place, j: u32, dimension: u32) -> (f64, f64) {
     let number = (step.sample_index / BATCHES).wrapping_mul(inputs.view.directions).wrapping_add(j);
     let coordinate = |d: u32| {
         let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension + d);
@@ -51,6 +50,9 @@ pub(super) fn direction_point(inputs: &Inputs, step: &Step, index: u32, j: u32, 
     };
     (coordinate(0), coordinate(1))
 }
+
+/// Column and row of a pixel in the full image.
+pub(super) type Place = (u32, u32);
 
 /// Where shadow rays of a point begin. `normal` is the geometric one.
 pub(super) fn lifted(point: DVec3, normal: DVec3) -> DVec3 {
@@ -96,6 +98,10 @@ pub fn accumulate(
     }
     let seen = seen(inputs, surface);
     let matter = matter_at(inputs, surface);
+    // Of all other matter light is gathered.
+    if inputs.features.integrator == INTEGRATOR_CLOUD && matter.material.model != MODEL_LAMBERT {
+        return Contribution::default();
+    }
     let (delta, triangle, factor) = if matter.material.model == MODEL_LAMBERT {
         let weights = surface.barycentric.as_dvec2();
         let strength = texture::medium(inputs, matter.material, surface.triangle, weights).strength;
@@ -127,7 +133,8 @@ pub fn accumulate(
         MODEL_DIRECTIONAL => directed(local, &seen, delta, entry.shading, wi, exponent),
         _ => profile::obliqueness(local, entry.shading.dot(wi), false),
     };
-    Contribution::of(leaving * factor * entering_light(inputs, step, index, &entry, value))
+    let place = position(inputs.view, step, index);
+    Contribution::of(leaving * factor * entering_light(inputs, step, place, &entry, value))
 }
 
 /// The base colour's texture, which tints what crosses the surface; the factor is in the profile's strength.
@@ -227,16 +234,16 @@ fn given_factor(matter: Matter, rate: f64, seen: &Seen, probe: &Probe, delta: DV
 }
 
 /// A point where light enters.
-struct Entry<'a> {
+pub(super) struct Entry<'a> {
     inputs: &'a Inputs<'a>,
     material: &'a Material,
     point: DVec3,
     /// Geometric normal on the camera's side of xo.
     normal: DVec3,
     /// Interpolated normal on that side.
-    shading: DVec3,
+    pub shading: DVec3,
     /// Base colour where the light crosses the surface.
-    tint: DVec3,
+    pub tint: DVec3,
     /// Weights of the second and third vertex.
     weights: DVec2,
     /// Share of the material's roughness.
@@ -244,7 +251,7 @@ struct Entry<'a> {
 }
 
 impl<'a> Entry<'a> {
-    fn new(inputs: &'a Inputs<'a>, material: &'a Material, side: f64, point: DVec3, triangle: u32) -> Entry<'a> {
+    pub fn new(inputs: &'a Inputs<'a>, material: &'a Material, side: f64, point: DVec3, triangle: u32) -> Entry<'a> {
         let shape = &inputs.triangles[triangle as usize];
         let weights = barycentric(shape, point);
         let shading = side * shading_normal(inputs, triangle, weights);
@@ -268,7 +275,13 @@ impl<'a> Entry<'a> {
 /// E: the light of the step's rays that enters.
 ///
 /// `value` is what a direction's light weighs besides.
-fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
+pub(super) fn entering_light(
+    inputs: &Inputs,
+    step: &Step,
+    place: Place,
+    entry: &Entry,
+    value: impl Fn(DVec3) -> DVec3,
+) -> DVec3 {
     let origin = lifted(entry.point, entry.normal);
     let first_direction = inputs.features.first_direction(inputs.view);
     let directions = f64::from(inputs.view.directions);
@@ -284,12 +297,12 @@ fn entering_light(inputs: &Inputs, step: &Step, index: u32, entry: &Entry, value
             return entering(incident.wi, &|| incident.irradiance * visible());
         }
         if k < first_direction {
-            let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_EMITTER);
+            let (u1, u2) = direction_point(inputs, step, place, k - inputs.view.light_count, DIM_EMITTER);
             let point = emitter::draw(inputs, origin, u1, u2);
             let pdf = direction_pdf(inputs, entry.shading, point.wi);
             return entering(point.wi, &|| from_emitter(inputs, origin, &point, pdf) / directions);
         }
-        let (u1, u2) = direction_point(inputs, step, index, k - first_direction, DIM_LIGHT);
+        let (u1, u2) = direction_point(inputs, step, place, k - first_direction, DIM_LIGHT);
         let wi = direction(inputs, entry.shading, u1, u2);
         let pdf = direction_pdf(inputs, entry.shading, wi);
         entering(wi, &|| from_direction(inputs, origin, wi, pdf) / directions)

@@ -9,8 +9,11 @@ pub mod area;
 pub mod begin;
 pub mod boundary;
 pub mod clear;
+pub mod cluster;
 pub mod emitter;
+pub mod gather;
 pub mod intersect;
+pub mod irradiance;
 pub mod light;
 pub mod math;
 pub mod mixture;
@@ -101,7 +104,7 @@ fn render_pixel(inputs: &Inputs, index: u32, rows: Range<u32>, samples: Range<u3
     for sample_index in samples.clone() {
         let step = step(inputs, sample_index, rows.clone(), samples.clone());
         let batch = random::batch(sample_index) as usize;
-        let stratum = random::stratum(sample_index);
+        let stratum = random::stratum(&inputs.features, sample_index);
         let surface = match first[batch] {
             Some((known, surface)) if known == stratum => surface,
             _ => primary::primary(inputs, &step, index),

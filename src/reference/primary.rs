@@ -6,7 +6,7 @@
 use super::pixel::position;
 use super::random::{batch, key, scramble, sobol, stratum, unit};
 use super::{Inputs, intersect};
-use crate::shared::{DIM_PIXEL, MISS, Step, Surface, View};
+use crate::shared::{DIM_PIXEL, Features, MISS, Step, Surface, View};
 use glam::{DVec3, Vec2};
 
 /// A ray of the camera.
@@ -21,10 +21,10 @@ pub struct CameraRay {
 }
 
 /// The ray of pixel `index` of the band, through its centre or through the point of the sample's stratum.
-pub fn camera_ray(view: &View, step: &Step, index: u32) -> CameraRay {
+pub fn camera_ray(features: &Features, view: &View, step: &Step, index: u32) -> CameraRay {
     let (px, py) = position(view, step, index);
     let coordinate = |d: u32| {
-        let point = sobol(stratum(step.sample_index), d as usize);
+        let point = sobol(stratum(features, step.sample_index), d as usize);
         unit(scramble(point, key(view.seed, px, py, batch(step.sample_index), DIM_PIXEL + d)))
     };
     let (u, v) = if step.pixel_centre != 0 { (0.5, 0.5) } else { (coordinate(0), coordinate(1)) };
@@ -38,7 +38,7 @@ pub fn camera_ray(view: &View, step: &Step, index: u32) -> CameraRay {
 
 /// The first surface of pixel `index` of the band.
 pub fn primary(inputs: &Inputs, step: &Step, index: u32) -> Surface {
-    let ray = camera_ray(inputs.view, step, index);
+    let ray = camera_ray(&inputs.features, inputs.view, step, index);
     match intersect::closest(inputs, ray.origin, ray.direction, -ray.reach, f64::INFINITY) {
         None => Surface { triangle: MISS, ..Default::default() },
         Some(hit) => {

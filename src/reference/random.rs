@@ -14,7 +14,7 @@
 //!   Vegdahl, "Building a better LK hash" (2021).
 //! - Hash: `lowbias32` by C. Wellons with the constants of TheIronBorn (bias 0.108).
 
-use crate::shared::{BATCHES, DIMENSIONS, STRATUM};
+use crate::shared::{BATCHES, DIMENSIONS, Features, INTEGRATOR_CLOUD, STRATUM};
 
 /// (degree s, inner coefficients a, initial m) of dimensions 1 to 6; dimension 0 is the van der Corput sequence.
 const JOE_KUO: [(usize, u32, [u32; 4]); 6] = [
@@ -108,7 +108,9 @@ pub fn batch(sample_index: u32) -> u32 {
     sample_index % BATCHES
 }
 
-/// Number, within its batch, of the sub-pixel stratum of a sample.
-pub fn stratum(sample_index: u32) -> u32 {
-    sample_index / BATCHES / STRATUM
+/// Number, within its batch, of the sub-pixel stratum of a sample. Gathering is the same in all of a stratum, so there
+/// each sample has its own.
+pub fn stratum(features: &Features, sample_index: u32) -> u32 {
+    let samples = if features.integrator == INTEGRATOR_CLOUD { 1 } else { STRATUM };
+    sample_index / BATCHES / samples
 }

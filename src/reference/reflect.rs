@@ -12,6 +12,7 @@ use super::accumulate::{direction_point, from_direction, from_emitter, lifted, v
 use super::boundary::{ggx, schlick, smith_g2, visible_normal, visible_normal_pdf};
 use super::light::{self, FAR};
 use super::math::{basis, cosine_direction, from_local};
+use super::pixel::position;
 use super::primary::camera_ray;
 use super::projection::{Seen, material, seen};
 use super::sums::Contribution;
@@ -26,7 +27,7 @@ use std::f64::consts::PI;
 pub fn reflect(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Contribution {
     if surface.triangle == MISS {
         let shown = step.first != 0 && inputs.view.show_environment != 0;
-        let direction = camera_ray(inputs.view, step, index).direction;
+        let direction = camera_ray(&inputs.features, inputs.view, step, index).direction;
         return Contribution::of(if shown { light::environment(inputs, direction) } else { DVec3::ZERO });
     }
     let seen = seen(inputs, surface);
@@ -59,7 +60,13 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
     }
     let first_direction = inputs.features.first_direction(inputs.view);
     if k < first_direction {
-        let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_EMITTER_REFLECT);
+        let (u1, u2) = direction_point(
+            inputs,
+            step,
+            position(inputs.view, step, index),
+            k - inputs.view.light_count,
+            DIM_EMITTER_REFLECT,
+        );
         let drawn = emitter::draw(inputs, origin, u1, u2);
         let cosine = cosine(drawn.wi);
         if lobe.is_mirror() || cosine <= 0.0 {
@@ -81,7 +88,7 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
         };
         return reflectance * arriving;
     }
-    let (u1, u2) = direction_point(inputs, step, index, j, DIM_REFLECT);
+    let (u1, u2) = direction_point(inputs, step, position(inputs.view, step, index), j, DIM_REFLECT);
     let wi = lobe.direction(inputs, u1, u2);
     let pdf = lobe.direction_pdf(inputs, wi);
     let cosine = cosine(wi);

@@ -236,7 +236,13 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
             return Some(part * incident.irradiance * visibility(inputs, exit, incident.wi, incident.distance - along));
         }
         if k < first_direction {
-            let (u1, u2) = direction_point(inputs, step, index, k - inputs.view.light_count, DIM_SINGLE_EMITTER);
+            let (u1, u2) = direction_point(
+                inputs,
+                step,
+                position(inputs.view, step, index),
+                k - inputs.view.light_count,
+                DIM_SINGLE_EMITTER,
+            );
             let drawn = emitter::draw(inputs, point, u1, u2);
             let reach = drawn.distance * f64::from(EMITTER_REACH);
             let (part, exit, along) = passage(drawn.wi, reach, drawn.triangle)?;
@@ -245,7 +251,8 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
             let density = drawn.density + direction_pdf(inputs, &directions, drawn.wi);
             return (!hidden).then(|| part * drawn.radiance / (density * each));
         }
-        let u = direction_point(inputs, step, index, k - first_direction, DIM_SINGLE_LIGHT);
+        let u =
+            direction_point(inputs, step, position(inputs.view, step, index), k - first_direction, DIM_SINGLE_LIGHT);
         let wi = direction(inputs, &directions, u)?;
         let pdf = direction_pdf(inputs, &directions, wi);
         let (part, exit, along) = passage(wi, FAR, MISS)?;

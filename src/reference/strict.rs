@@ -94,7 +94,7 @@ pub fn primary(inputs: &Inputs, step: &Step, index: u32) -> Surface {
     let view = inputs.view;
     let (px, py) = position(view, step, index);
     let coordinate = |d: u32| {
-        let point = sobol(stratum(step.sample_index), d as usize);
+        let point = sobol(stratum(&inputs.features, step.sample_index), d as usize);
         unit(scramble(point, key(view.seed, px, py, batch(step.sample_index), DIM_PIXEL + d))) as f32
     };
     let within = if step.pixel_centre != 0 { Vec2::splat(0.5) } else { vec2(coordinate(0), coordinate(1)) };

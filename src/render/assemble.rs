@@ -6,6 +6,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, download_to},
     image::{Attribute, Channel, Image},
+    settings::{Cloud, Integrator},
     shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
     timeline::{self, Work},
 };
@@ -208,6 +209,12 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
         "resolution": [renderer.prepared.view.width, renderer.prepared.view.height],
         "camera": renderer.prepared.camera.name,
         "directions": settings.directions,
+        "integrator": settings.integrator.to_string(),
+        // Points, opening and samples.
+        "cloud": (settings.integrator == Integrator::Cloud).then(|| {
+            let Cloud { points, opening, samples } = settings.cloud;
+            serde_json::json!([points, opening, samples])
+        }),
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
         "model": settings.model.to_string(),

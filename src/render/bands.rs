@@ -5,7 +5,7 @@ use crate::{
     error::{Error, Result},
     prepare::Prepared,
     settings::Settings,
-    shared::{BATCHES, Slot},
+    shared::{BATCHES, GATHER_POINTS, Slot},
 };
 
 /// Pixels of a band where nothing else limits it: enough to fill a GPU, few enough for a processor's caches.
@@ -57,6 +57,9 @@ pub fn slots(prepared: &Prepared) -> Vec<Slot> {
     let mut slots = vec![Slot::Surfaces, Slot::RunningSums, Slot::Pixels];
     if prepared.has_probes {
         slots.extend([Slot::Probes, Slot::HitLists]);
+    }
+    if prepared.view.leaves > GATHER_POINTS {
+        slots.push(Slot::Gathers);
     }
     if prepared.features.batches != 0 {
         slots.push(Slot::BatchSums);

@@ -3,6 +3,7 @@
 mod assemble;
 mod bands;
 mod budget;
+mod cloud;
 mod plan;
 mod record;
 mod sums;
@@ -20,7 +21,7 @@ use crate::{
     reference::random,
     scene::{self, Frame, Scene},
     settings::Settings,
-    shared::{BATCHES, MAX_RAYS, MAX_SINGLE, NO_SAMPLES, Progress as Count, STRATUM, Slot, Step},
+    shared::{BATCHES, GATHER_POINTS, MAX_RAYS, MAX_SINGLE, NO_SAMPLES, Progress as Count, STRATUM, Slot, Step},
     timeline::{self, Work},
 };
 use bands::Band;
@@ -64,7 +65,7 @@ macro_rules! kernels {
             &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
     };
 }
-kernels!(begin, clear, primary, sample, reproject, accumulate, reflect, single, resolve);
+kernels!(begin, clear, irradiance, cluster, primary, sample, reproject, accumulate, gather, reflect, single, resolve);
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -100,6 +101,8 @@ pub struct Renderer {
     strata: [Option<u32>; BATCHES as usize],
     /// First sample of the sums.
     begin: Option<u32>,
+    /// The cloud is lit, and by the lights that there are.
+    lit: bool,
     /// Samples were submitted before, so the driver has compiled what it puts off until then.
     warm: bool,
     /// How often the sums of the band on the device are copied to the host, and when they last were.
@@ -244,6 +247,7 @@ impl Renderer {
             resident: recording.then_some(0),
             strata: [None; BATCHES as usize],
             begin: None,
+            lit: false,
             warm: false,
             keep_every: None,
             kept_at: Instant::now(),
@@ -299,6 +303,7 @@ impl Renderer {
     pub fn reseed(&mut self, seed: u32) -> Result<()> {
         self.reset();
         self.settings.seed = seed;
+        self.lit = false;
         self.prepared.view.seed = seed;
         let views = self.buffer(Slot::Views).expect("every renderer has a view");
         upload(&self.device, views, bytemuck::bytes_of(&self.prepared.view))
@@ -331,6 +336,7 @@ impl Renderer {
         let mut state = Progress { done: 0, total: pixels * u64::from(range.end - range.start) };
         let early = |band: &Band| u64::from(band.pixels) * u64::from(band.end.min(range.end) - range.start);
         state.done += self.bands.iter().map(early).sum::<u64>();
+        self.light_cloud()?;
         let mut stop = false;
         let mut pass = range.start..range.start + 1;
         while !pass.is_empty() {
@@ -375,7 +381,7 @@ impl Renderer {
             for sample_index in samples.clone() {
                 let point = random::point(sample_index);
                 let step = Step { first_row, pixel_count: pixels, sample_index, point, ..Step::default() };
-                let stratum = Some(random::stratum(sample_index));
+                let stratum = Some(random::stratum(&prepared.features, sample_index));
                 let resident = &mut strata[random::batch(sample_index) as usize];
                 kernels.sample(prepared, step, *resident != stratum, &mut dispatch);
                 *resident = stratum;
@@ -439,6 +445,15 @@ impl Kernels {
         if primary {
             dispatch(&self.primary, &step);
         }
+        // By parts, so that no invocation loops without end.
+        let parts = prepared.view.leaves.div_ceil(GATHER_POINTS);
+        for part in 0..parts {
+            (step.node, step.first, step.last) = (parts + part, (part == 0).into(), (part + 1 == parts).into());
+            if dispatch(&self.gather, &step) {
+                step.count = 0;
+            }
+        }
+        step.first = 1;
         dispatch(&self.sample, &step);
         dispatch(&self.reproject, &step);
         // Shadow rays in portions, so that no invocation loops without end; a scene without light has one empty

@@ -7,7 +7,7 @@ use crate::{
     prepare::{Prepared, prepare},
     scene::Scene,
     settings::{Model, Settings},
-    shared::{self, BOUNDARY_ROW, MAX_RECORDED, Slot, TABLE_NODES},
+    shared::{self, BOUNDARY_ROW, MAX_RECORDED, MODEL_LAMBERT, Slot, TABLE_NODES},
     table::block::{Block, MOST_CELLS},
 };
 
@@ -121,13 +121,22 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
             false => (false, "nothing is recorded into a caller's command buffer"),
         },
         "resolve" => (true, "makes means and variances of the sums"),
+        "irradiance" | "cluster" | "gather" => match prepared.clusters.is_empty() {
+            false => (true, "light is gathered from a cloud of points"),
+            true => (false, "no light is gathered from a cloud of points"),
+        },
         "sample" | "reproject" => match (prepared.has_probes, prepared.has_translucent) {
             (true, _) => (true, "a surface is translucent"),
+            (false, true) if !prepared.clusters.is_empty() => (false, "light is gathered from a cloud of points"),
             (false, true) => (false, "every translucent surface is in the opaque limit: light leaves where it entered"),
             (false, false) => (false, "no surface is translucent"),
         },
         "accumulate" => match prepared.has_translucent {
-            true => (true, "a surface is translucent"),
+            true if prepared.clusters.is_empty() => (true, "a surface is translucent"),
+            true if prepared.features.models & (1 << MODEL_LAMBERT) == 0 => {
+                (false, "light is gathered from a cloud of points")
+            }
+            true => (true, "a translucent surface is in the opaque limit"),
             false => (false, "no surface is translucent"),
         },
         "single" => match prepared.has_single && prepared.ray_count > 0 {
@@ -172,6 +181,7 @@ pub(super) fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
         (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
         (Slot::Balances, bytemuck::cast_slice(&prepared.balances)),
         (Slot::Mixtures, bytemuck::cast_slice(&prepared.mixtures)),
+        (Slot::Clusters, bytemuck::cast_slice(&prepared.clusters)),
     ]
     .into_iter()
     .filter(|(_, data)| !data.is_empty())
@@ -221,7 +231,9 @@ fn absent(slot: Slot) -> String {
         Slot::Profiles => "no material has the table model",
         Slot::Thickness | Slot::Balances => "no profile depends on the curvature",
         Slot::Mixtures => "no set holds several materials",
-        Slot::Probes | Slot::HitLists => "no surface is translucent, or all that are in the opaque limit",
+        Slot::Probes | Slot::HitLists => "no surface is translucent, all are in the opaque limit, or light is gathered",
+        Slot::Clusters => "no light is gathered from a cloud",
+        Slot::Gathers => "one dispatch gathers all light, or none is gathered",
         Slot::BatchSums => "no variance is asked for",
         Slot::Progresses | Slot::Samples | Slot::Colors => "nothing is recorded into a caller's command buffer",
         Slot::Counters => "steps are counted in tests and benchmarks only",

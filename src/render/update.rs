@@ -74,6 +74,7 @@ impl Renderer {
             }
         }
         self.torn = false;
+        self.lit = false;
         self.prepared = new;
         self.authored = scene.materials.clone();
         self.scene_hash = scene::hash(scene, geometry);
@@ -179,6 +180,8 @@ impl Renderer {
 
     fn write(&mut self, slot: Slot, bytes: &[u8]) -> Result<()> {
         self.reset();
+        // A camera changes no light.
+        self.lit &= slot == Slot::Views;
         upload(&self.device, self.buffer(slot).expect("every renderer has it"), bytes)
     }
 }

@@ -51,10 +51,22 @@ constants! {
     OPAQUE_ALPHA_MIN: f32 = 1e-3;
     /// Most media of one set of surfaces that exchange light.
     MAX_MEMBERS: u32 = 8;
+    /// Points below one node of the cloud that `gather` starts from at most, so that it stays below Mesa 22's cap of 65,535
+    /// loop trips whatever it opens.
+    GATHER_POINTS: u32 = 4096;
+    /// Row that stands for the points of the cloud in the keys of random numbers, in which pixels have their own.
+    POINTS_ROW: u32 = 0xffffffffu32;
+    /// Value of `Cluster::set` where points of several sets lie below it.
+    SEVERAL: u32 = 0xffffffffu32;
     /// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
     BVH_DEPTH: u32 = 24;
     /// Value of `Surface::triangle` for a ray that hits nothing.
     MISS: u32 = 0xffffffffu32;
+
+    /// Integrator: probes, whose hits are lit.
+    INTEGRATOR_SAMPLE: u32 = 0;
+    /// Integrator: points on the surface are lit once, and each pixel gathers from them.
+    INTEGRATOR_CLOUD: u32 = 1;
 
     /// Projection: all techniques combined by the balance heuristic.
     PROJECTION_MIS: u32 = 0;
@@ -288,6 +300,10 @@ structs! {
         emitter_count: u32,
         /// 1 to add the environment where a camera ray hits nothing.
         show_environment: u32,
+        /// Leaves of the cloud's tree, a power of two.
+        leaves: u32,
+        /// Radius over distance below which a cluster's centre stands for its points.
+        opening: f32,
         /// Constant radiance, or the factor on the image's.
         environment_scale: Vec3,
         /// World direction to image direction: rows of a rotation.
@@ -317,14 +333,19 @@ structs! {
         ray_begin: u32,
         /// Shadow rays of this dispatch; 0 where the scene has no light.
         ray_count: u32,
-        /// 1 in the sample's first dispatch of `reflect`, which also adds what does not depend on shadow rays.
+        /// 1 in the sample's first dispatch of `reflect`, which also adds what does not depend on shadow rays, and of
+        /// `gather`, which begins its sums.
         first: u32,
+        /// 1 in the sample's last dispatch of `gather`.
+        last: u32,
         /// 1 in the sample's first dispatch of all that add to the sums: it counts the sample.
         count: u32,
-        /// First sample of the whole range that is in the sums, for `resolve`.
+        /// First sample of the whole range that is in the sums, for `resolve`; of those that light the cloud.
         range_begin: u32,
         /// End of that range.
         range_end: u32,
+        /// Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from.
+        node: u32,
         /// The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
         point: [u32; 5],
     }
@@ -436,6 +457,8 @@ structs! {
         ramp: u32,
         /// 1 + the number of its table in Boundaries; 0 for a smooth boundary.
         boundary: u32,
+        /// Cloud: radius within which light is interpolated between points.
+        reach: f32,
         /// Where sets hold several materials: what strength and beam leave out and the exit's material brings, its tint over
         /// pi (1 - rho_e).
         exit: Vec3,
@@ -445,6 +468,42 @@ structs! {
     struct Balance {
         /// At the three vertices.
         at: [Vec3; 3],
+    }
+
+    /// A point of the cloud (a leaf), or what the points below a node of its tree have in common.
+    struct Cluster {
+        /// Of several points, the mean by flux.
+        position: Vec3,
+        /// Geometric normal, of several points the mean by flux; 0 where they have none.
+        normal: Vec3,
+        /// Distance within which all of its points are.
+        radius: f32,
+        /// Mean squared distance of its points from that, by flux.
+        spread: f32,
+        /// Flux that enters: of table models, at slope 0.
+        flux: Vec3,
+        /// Flux times 1 - cosine of refraction, which the slope of table models multiplies.
+        oblique: Vec3,
+        /// Area that its points stand for; 0 for a leaf without a point.
+        area: f32,
+        /// Near mass times area.
+        mass: Vec3,
+        /// The set that they belong to, or SEVERAL.
+        set: u32,
+        /// Of a leaf: its triangle, and the weights of the second and third vertex.
+        triangle: u32,
+        barycentric: Vec2,
+    }
+
+    /// What a pixel has gathered so far.
+    struct Gather {
+        /// From afar.
+        far: Vec3,
+        /// Weighted light and weights of the points that are near.
+        near: Vec3,
+        weight: Vec3,
+        /// Weighted near masses.
+        mass: Vec3,
     }
 
     /// The media of a set of several materials.
@@ -631,6 +690,10 @@ buffers! {
     Mixtures = 26: MIXTURES [Mixture] mixtures;
     /// Balances of each triangle, once for as many materials as its set has.
     Balances = 27: BALANCES [Balance] balances;
+    /// The cloud's tree: node i has the children 2 i and 2 i + 1, the leaves are the second half; node 0 is none.
+    Clusters = 28: CLUSTERS [Cluster] clusters;
+    /// One per pixel of the band, where a cloud is gathered by several dispatches.
+    Gathers = 29: GATHERS [Gather] gathers;
 }
 
 features! {
@@ -656,6 +719,8 @@ features! {
     recorded = 20: RECORDED,
     /// 1 where a set holds several materials.
     mixtures = 11: MIXED,
+    /// One of INTEGRATOR_*.
+    integrator = 12: INTEGRATOR,
 }
 
 impl Features {

@@ -27,6 +27,7 @@ const EVERYTHING: Features = Features {
     curvature: 1,
     recorded: 0,
     mixtures: 0,
+    integrator: INTEGRATOR_SAMPLE,
 };
 
 /// A device, and kernels made on it of modules that can be replaced.

@@ -6,7 +6,7 @@ use crate::{
     prepare::{Prepared, prepare},
     reference::Inputs,
     scene::{Environment, EnvironmentMap, LoadOptions, Scene},
-    settings::{Directional, Model, Projection, Settings, SingleScattering},
+    settings::{Cloud, Directional, Integrator, Model, Projection, Settings, SingleScattering},
 };
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -175,4 +175,25 @@ fn mixed() -> Result<Case> {
         set.materials = members;
     }
     Case::new("three media, mis, delta lights", scene, &settings(12))
+}
+
+/// Scenes whose light is gathered: models, lights, a rough boundary.
+///
+/// # Errors
+/// As [`cases`].
+pub fn clouds() -> Result<Vec<Case>> {
+    let list = [
+        ("cloud, standard, delta lights", Model::Standard, Light::Delta, 0.0),
+        ("cloud, burley, emitters", Model::Burley, Light::Emitters, 0.5),
+        ("cloud, table, image", Model::Table, Light::Image, 0.0),
+    ];
+    let mut cases = vec![];
+    for (seed, (name, model, light, roughness)) in (17..).zip(list) {
+        let mut scene = still_life(&materials(), light)?;
+        scene.materials[0].roughness = roughness;
+        let cloud = Cloud { points: 1500, opening: 0.4, samples: 3 };
+        let settings = Settings { model, integrator: Integrator::Cloud, cloud, ..settings(seed) };
+        cases.push(Case::new(name, scene, &settings)?);
+    }
+    Ok(cases)
 }

@@ -25,6 +25,7 @@
 mod amber;
 mod bench;
 pub mod cases;
+pub mod cloud;
 pub mod dump;
 mod expectations;
 pub mod functions;
@@ -162,6 +163,9 @@ tests! {
     "sums.add" ["functions"] geometry::add;
     "kernel.begin" ["begin"] stages::begin;
     "kernel.clear" ["clear"] stages::clear;
+    "kernel.irradiance" ["irradiance"] cloud::irradiance;
+    "kernel.cluster" ["cluster"] cloud::cluster;
+    "kernel.gather" ["gather"] cloud::gather;
     "kernel.primary" ["primary"] |context| stages::each(context, stages::primary);
     "kernel.sample" ["sample"] |context| stages::each(context, stages::sample);
     "kernel.reproject" ["reproject"] |context| stages::each(context, stages::reproject);

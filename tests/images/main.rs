@@ -3,6 +3,7 @@
 
 mod bad_meshes;
 mod closed_forms;
+mod cloud;
 mod edge_cases;
 mod emitters;
 mod fireflies;

@@ -2,6 +2,7 @@
 //! with synchronization checks.
 
 // Each test program uses its part.
+mod cloud;
 #[allow(dead_code)]
 #[path = "../common/mod.rs"]
 mod common;

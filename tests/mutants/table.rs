@@ -106,6 +106,13 @@ mutants! {
     "single.comp", "sign", "kernel.single": "along = -depth * dot(d, outward)" => "along = depth * dot(d, outward)";
     "reflect.comp", "lost factor", "kernel.reflect": "mix(vec3(f0 * f0)," => "mix(vec3(f0),";
     "reflect.comp", "lost factor", "kernel.reflect": "(c * c * c * c * c)" => "(c * c * c * c)";
+    "irradiance.comp", "lost factor", "kernel.irradiance": "light *= crossing(m, c, share);" => "";
+    "irradiance.comp", "index", "kernel.irradiance": "uvec2(index, POINTS_ROW)" => "uvec2(index + 1u, POINTS_ROW)";
+    "cluster.comp", "sign", "kernel.cluster": "c.flux = a.flux + b.flux" => "c.flux = a.flux - b.flux";
+    "cluster.comp", "index", "kernel.cluster": "b = clusters[2u * node + 1u]" => "b = clusters[2u * node]";
+    "gather.comp", "index", "kernel.gather": "findLSB(j + 1u)" => "findLSB(j)";
+    "gather.comp", "lost factor", "kernel.gather": "(sum.mass[c] / sum.weight[c]) * (sum" => "(sum";
+    "gather.comp", "sign", "kernel.gather": "sum.far += (1.0 - near)" => "sum.far += (1.0 + near)";
     "resolve.comp", "index", "kernel.resolve": "float(BATCHES - 1u)" => "float(BATCHES)";
     "resolve.comp", "index", "kernel.resolve": "(end + BATCHES - 1u - b)" => "(end + BATCHES - b)";
 }

@@ -1,6 +1,7 @@
 //! The points: stratification of the net, scrambling, independence of keys.
 
 use translucent::reference::random::*;
+use translucent::shared::Features;
 
 /// Points 0 to 2^m - 1 of two dimensions, scrambled with two keys.
 fn points(m: u32, dimensions: [usize; 2], keys: Option<[u32; 2]>) -> Vec<[u32; 2]> {
@@ -123,7 +124,7 @@ fn units_are_below_one() {
 
 #[test]
 fn sample_indices_split_into_batches_and_strata() {
-    assert_eq!((batch(13), stratum(13)), (5, 0));
-    assert_eq!((batch(32), stratum(32)), (0, 1));
+    assert_eq!((batch(13), stratum(&Features::default(), 13)), (5, 0));
+    assert_eq!((batch(32), stratum(&Features::default(), 32)), (0, 1));
     assert_eq!(point(17), std::array::from_fn(|k| sobol(2, k + 2)));
 }

@@ -41,7 +41,7 @@ fn camera_rays_pass_through_their_pixels() {
         for sample_index in [0, 13, 100] {
             let step = Step { first_row: 4, ..step(&world.inputs(), sample_index, 4..6, 0..1) };
             for index in 0..6 {
-                let ray = camera_ray(&view, &step, index);
+                let ray = camera_ray(&Features::default(), &view, &step, index);
                 let from = ray.origin - view.pivot.as_dvec3();
                 let (right, up) = (view.right.as_dvec3(), view.up.as_dvec3());
                 let x = (from.dot(right) / right.length_squared() + 1.0) / 2.0 * 8.0;
@@ -54,7 +54,7 @@ fn camera_rays_pass_through_their_pixels() {
                 } else {
                     assert!((eye.z - 5.0).abs() < 1e-6 && ray.direction.distance(-DVec3::Z) < 1e-9);
                 }
-                let centre = camera_ray(&view, &Step { pixel_centre: 1, ..step }, index).origin;
+                let centre = camera_ray(&Features::default(), &view, &Step { pixel_centre: 1, ..step }, index).origin;
                 let expected = view.pivot.as_dvec3()
                     + right * (2.0 * (px + 0.5) / 8.0 - 1.0)
                     + up * (1.0 - 2.0 * (py + 0.5) / 6.0);
@@ -72,7 +72,7 @@ fn strata_cover_the_pixel() {
     for stratum in 0..64 {
         let origin = |sample: u32| {
             let index = (stratum * STRATUM + sample) * BATCHES + 3;
-            camera_ray(&world.view, &step(&world.inputs(), index, 0..4, 0..1), 5).origin
+            camera_ray(&Features::default(), &world.view, &step(&world.inputs(), index, 0..4, 0..1), 5).origin
         };
         assert_eq!(origin(0), origin(3));
         let from = origin(0) - world.view.pivot.as_dvec3();
@@ -102,7 +102,7 @@ fn primary_finds_the_nearest_surface() {
             12 => floor += 1,
             _ => matter += 1,
         }
-        let ray = camera_ray(inputs.view, &step, index);
+        let ray = camera_ray(&inputs.features, inputs.view, &step, index);
         let to = surface.position.as_dvec3() - ray.origin;
         assert!((to - to.dot(ray.direction) * ray.direction).length() < 1e-6, "off the ray");
         let at = world.surface(surface.triangle, surface.position.as_dvec3()).barycentric;

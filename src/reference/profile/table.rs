@@ -230,7 +230,7 @@ pub(super) fn radius(matter: Matter, c: usize, share: f64, u: f64) -> f64 {
 }
 
 /// k of the three channels.
-pub(super) fn slope(matter: Matter) -> DVec3 {
+pub(in crate::reference) fn slope(matter: Matter) -> DVec3 {
     parts(matter).iter().map(|part| part.weight * Node::of(matter, part.node).vector(5)).sum()
 }
 
