@@ -52,7 +52,7 @@ void main() {
         uint of = clusters[node].set;
         bool useful = clusters[node].area > 0.0 && (of == set || of == SEVERAL) && r - radius <= m.radius_max;
         bool leaf = node >= view.leaves;
-        bool stands = leaf || of != SEVERAL && radius * (1.0 + 0.5 * m.camera_rate * r) < view.opening * r;
+        bool stands = leaf || of != SEVERAL && radius < view.opening * r;
         if (useful && !stands) {
             j = 2u * j;
             continue;

@@ -65,7 +65,7 @@ impl Cloud {
 
 impl Default for Cloud {
     fn default() -> Self {
-        Cloud { points: 1 << 15, opening: 0.5, samples: 32 }
+        Cloud { points: 1 << 15, opening: 0.7, samples: 32 }
     }
 }
 

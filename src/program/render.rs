@@ -37,7 +37,7 @@ pub struct Render {
     /// The EXR file to write; without it the scene's name with .exr, in the current folder.
     #[arg(short, long, value_name = "OUT.exr")]
     output: Option<PathBuf>,
-    /// Samples of each pixel, 64 or, of a cloud, 8; A:B renders samples A to B-1, a part that `merge` puts together with
+    /// Samples of each pixel, 64 or, of a cloud, 4; A:B renders samples A to B-1, a part that `merge` puts together with
     /// others.
     #[arg(long, value_name = "M|A:B", value_parser = arguments::samples)]
     samples: Option<Range<u32>>,
@@ -172,7 +172,7 @@ impl Render {
     fn samples(&self) -> Range<u32> {
         self.samples.clone().unwrap_or(match self.scene.integrator {
             Integrator::Sample => 0..64,
-            Integrator::Cloud => 0..8,
+            Integrator::Cloud => 0..4,
         })
     }
 

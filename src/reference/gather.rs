@@ -17,7 +17,8 @@
 //!
 //! # Tree
 //! Points that are small beside their distance count together ([`cluster`](super::cluster)): those of the radius s at r
-//! are opened unless s (1 + rate r / 2) < opening r, the rate at which f falls at large r. Opening 0 takes every point.
+//! are opened unless s < opening r. Opening 0 takes every point. Where f falls exponentially a group's error is larger, by
+//! (1 + x / 2)^2 at x decay lengths, and its light smaller, by e^-x, which is more.
 //!
 //! With the variance V of the points about their mean, as much in each direction of the plane that they lie about, whose
 //! normal makes the cosine c with the way to them, squared distances have the mean r^2 + V and, to the second order in the
@@ -92,7 +93,7 @@ fn below(inputs: &Inputs, clusters: &[Cluster], surface: &Surface, node: usize) 
             continue;
         }
         let leaf = 2 * node >= clusters.len();
-        let small = radius * (1.0 + f64::from(material.camera_rate) * r / 2.0) < f64::from(inputs.view.opening) * r;
+        let small = radius < f64::from(inputs.view.opening) * r;
         let reach = f64::from(material.reach);
         if !leaf && (cluster.set == SEVERAL || !small) {
             open.extend([2 * node, 2 * node + 1]);
