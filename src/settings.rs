@@ -24,9 +24,9 @@ pub enum Integrator {
     #[default]
     Sample = shared::INTEGRATOR_SAMPLE,
     /// Points on the surface are lit once and each pixel gathers from all of them: without noise but that of the light
-    /// at the points, with an error that falls with their distance and with [`Cloud::opening`]: by default less than 1 %
-    /// from pixel to pixel where light is even, and where it changes over half a mean free path what that blurs. Each
-    /// sample is a place in the pixel.
+    /// at the points, with an error that falls with their distance and with [`Cloud::opening`]: where light is even, less
+    /// than 1 % of single points and 2 % of groups by the default opening; where it changes over half a mean free path,
+    /// what that blurs. Each sample is a place in the pixel.
     ///
     /// Not for the directional dipole, sets of several materials and media that a texture changes, nor for recordings.
     /// Light enters on the outer side of surfaces alone.

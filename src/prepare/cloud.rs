@@ -1,7 +1,7 @@
 //! The points of the cloud, spread over the surfaces that exchange light, and the tree that they are the leaves of.
 //!
 //! Each point stands for the same area of its set. Points go from triangle to triangle in the order of the BVH, which is one
-//! of places, so that small triangles share them evenly; those within one triangle are a lattice.
+//! of places, so that small triangles share them evenly; of several candidates those stay that are far apart.
 
 use crate::{
     curvature::{
@@ -16,12 +16,17 @@ use crate::{
 };
 use glam::{DVec3, Vec3, vec2};
 use rayon::prelude::*;
-use std::{collections::HashMap, f64::consts::PI};
+use std::{
+    collections::{BinaryHeap, HashMap},
+    f64::consts::PI,
+};
 
 /// Distance between points, in mean free paths, that is fine enough.
 const SPACING: f64 = 0.5;
 /// Radius within which light is interpolated, in distances between points.
 const REACH: f64 = 2.5;
+/// Candidates for each point.
+const CANDIDATES: usize = 4;
 
 /// The tree with its leaves set and no light yet. Materials get their reach.
 ///
@@ -81,7 +86,8 @@ pub(super) fn clusters(
     let mut leaves = vec![];
     for (number, area, path) in sets {
         let count = (wanted(area, path) * share).round().max(1.0);
-        leaves.extend(spread(scene, number, area, count as usize));
+        let candidates = spread(scene, number, area, CANDIDATES * count as usize);
+        leaves.extend(thinned(candidates, count as usize, area));
         let index = scene.sets[number as usize].materials[0];
         // Sets of one material have the coarsest one's reach.
         materials[index].reach = materials[index].reach.max((REACH * (area / count).sqrt()) as f32);
@@ -150,33 +156,68 @@ fn facing(tree: &Tree, point: &Cluster, reach: f64, inside: impl Fn(f64) -> DVec
     tree.near(place, reach).filter(faces).map(|corners| triangle(&inside, place, corners)).sum()
 }
 
+/// `count` of a set's candidates, which is its area divided by: those that are left when the one with the nearest neighbours
+/// goes first, again and again (C. Yuksel, "Sample elimination", Computer Graphics Forum 34 (2015)).
+fn thinned(mut points: Vec<Cluster>, count: usize, area: f64) -> Vec<Cluster> {
+    // Twice the largest radius of as many discs that do not overlap.
+    let reach = 2.0 * (area / (2.0 * 3f64.sqrt() * count as f64)).sqrt();
+    let neighbours = neighbours(&points, reach, |squared| (1.0 - squared.sqrt() / reach).powi(8));
+    let mut weights: Vec<f64> = neighbours.iter().map(|near| near.iter().map(|(_, weight)| weight).sum()).collect();
+    // Weights only fall, so what comes out with an old one goes in again.
+    let key = |weights: &[f64], index: usize| (weights[index].to_bits(), index);
+    let mut heap: BinaryHeap<_> = (0..points.len()).map(|index| key(&weights, index)).collect();
+    let mut left = points.len();
+    while left > count
+        && let Some((bits, index)) = heap.pop()
+    {
+        let weight = weights[index].max(0.0);
+        if weight.to_bits() != bits {
+            weights[index] = weight;
+            heap.push(key(&weights, index));
+            continue;
+        }
+        points[index].area = 0.0;
+        left -= 1;
+        for &(other, weight) in &neighbours[index] {
+            weights[other] -= weight;
+        }
+    }
+    points.retain(|point| point.area > 0.0);
+    points.iter_mut().for_each(|point| point.area = (area / left as f64) as f32);
+    points
+}
+
+/// For each point those within `reach` that face as it does, itself too, with what their squared distance weighs.
+fn neighbours(points: &[Cluster], reach: f64, weight: impl Fn(f64) -> f64 + Sync) -> Vec<Vec<(usize, f64)>> {
+    let cell = |place: DVec3| (place / reach).floor().to_array().map(|x| x as i64);
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    for (index, point) in points.iter().enumerate() {
+        cells.entry(cell(point.position.as_dvec3())).or_default().push(index);
+    }
+    let near = |point: &Cluster| {
+        let place = point.position.as_dvec3();
+        let [x, y, z] = cell(place);
+        let around = (0..27).filter_map(|k| cells.get(&[x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]));
+        let facing = around.flatten().filter(|&&other| points[other].normal.dot(point.normal) > 0.0);
+        let distances = facing.map(|&other| (other, points[other].position.as_dvec3().distance_squared(place)));
+        let within = distances.filter(|(_, squared)| *squared < reach * reach);
+        within.map(|(other, squared)| (other, weight(squared))).collect()
+    };
+    points.par_iter().map(near).collect()
+}
+
 /// Rounds in which areas are evened out.
 const ROUNDS: usize = 8;
 
 /// Changes the areas that the points of a set stand for until those within the near weight of each have together what the
-/// surface has there: where two triangles meet their lattices leave gaps, or overlap.
+/// surface has there: they are not as far apart everywhere.
 fn even_out(tree: &Tree, reach: f64, points: &mut [Cluster]) {
     let w = |squared: f64| (1.0 - (squared / (reach * reach)).min(1.0)).powi(2);
     let inside = |squared: f64| {
         let rest = 1.0 - (squared / (reach * reach)).min(1.0);
         DVec3::splat(PI / 3.0 * reach * reach * (1.0 - rest.powi(3)))
     };
-    let cell = |place: DVec3| (place / reach).floor().to_array().map(|x| x as i64);
-    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-    for (index, point) in points.iter().enumerate() {
-        cells.entry(cell(point.position.as_dvec3())).or_default().push(index);
-    }
-    let near = |point: &Cluster| -> Vec<(usize, f64)> {
-        let place = point.position.as_dvec3();
-        let [x, y, z] = cell(place);
-        let around = (0..27).filter_map(|k| cells.get(&[x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]));
-        let weighed = around.flatten().filter(|&&other| points[other].normal.dot(point.normal) > 0.0).map(|&other| {
-            let squared = points[other].position.as_dvec3().distance_squared(place);
-            (other, w(squared))
-        });
-        weighed.filter(|(_, weight)| *weight > 0.0).collect()
-    };
-    let neighbours: Vec<_> = points.par_iter().map(near).collect();
+    let neighbours = neighbours(points, reach, w);
     let wanted: Vec<f64> = points.par_iter().map(|point| facing(tree, point, reach, inside).x).collect();
     let mut areas: Vec<f64> = points.iter().map(|point| f64::from(point.area)).collect();
     for _ in 0..ROUNDS {

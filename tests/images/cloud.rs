@@ -37,11 +37,11 @@ fn an_evenly_lit_plane_has_the_golden_radiance() {
         let squares = channel(&image, "subsurface.G").iter().map(|x| (f64::from(*x) / 0.418_550_831 - 1.0).powi(2));
         (squares.sum::<f64>() / 400.0).sqrt()
     };
-    // What the spacing leaves on a flat surface, as the settings state it: less than 1 % from pixel to pixel, from
-    // spacings of two mean free paths to half of one.
-    let errors = [error(2000, 0.0), error(8000, 0.0), error(32000, 0.0), error(32000, 0.5)];
+    // As the settings state it: of single points less than 1 % at spacings from two mean free paths to half of one, and of
+    // groups by the default opening less than 2 %.
+    let errors = [error(2000, 0.0), error(8000, 0.0), error(32000, 0.0), error(32000, 0.7)];
     println!("rms errors: {errors:?}");
-    assert!(errors.iter().all(|error| *error < 0.01), "{errors:?}");
+    assert!(errors[..3].iter().all(|error| *error < 0.01) && errors[3] < 0.02, "{errors:?}");
 }
 
 /// Two bodies that nearly touch, of different matter, one of them rough, under a lamp, the sun and a sky.
@@ -72,7 +72,7 @@ fn the_error_falls_with_spacing_and_opening() {
         // Standard error of the mean over all pixels, which are independent.
         let pixels = truth.channel("A").expect("contract").len() as f64;
         let total = |values: &[f32]| values.iter().map(|x| f64::from(*x)).sum::<f64>() / pixels;
-        let errors: Vec<(f64, f64)> = [(500, 1.0), (4000, 0.5), (16000, 0.25)]
+        let errors: Vec<(f64, f64)> = [(500, 1.0), (4000, 0.5), (16000, 0.1)]
             .into_iter()
             .map(|(points, opening)| {
                 let image = render(&scene, &Settings { model, ..settings(points, opening) }, 256);
@@ -87,7 +87,7 @@ fn the_error_falls_with_spacing_and_opening() {
             .collect();
         println!("{model}: rms over the mean, and error of the mean: {errors:?}");
         let noise = total(channel(&truth, "variance.R")).sqrt() / total(channel(&truth, "subsurface.R"));
-        assert!(errors[2].0 < 0.02 + 2.0 * noise && errors[2].1 < 0.005, "{model}: {errors:?}, noise {noise}");
+        assert!(errors[2].0 < 0.02 + 2.0 * noise && errors[2].1 < 0.01, "{model}: {errors:?}, noise {noise}");
         assert!(errors[2].0 < errors[0].0 && errors[2].1 < errors[0].1, "{model}: {errors:?}");
     }
 }
