@@ -37,6 +37,11 @@
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
 //!   primary                       sample         reproject       accumulate, single, reflect     resolve
 //!   └► Surfaces[pixel, batch]     └► Probes      └► HitLists     └► RunningSums, BatchSums       └► Pixels ─► Image
+//!
+//!   Integrator::Cloud, in place of sample, reproject and accumulate:
+//!   ┌─── when the lights change ───┐               ┌──────── per sample ────────┐
+//!   irradiance      cluster                        gather
+//!   └► Clusters     └► Clusters above them         └► RunningSums, BatchSums
 //! ```
 //!
 //! Each word with a capital is a buffer or a struct that [`shared`] defines once for Rust and GLSL. Each kernel is
@@ -78,7 +83,7 @@
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
 //! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like, and how much of its light the body gives back |
-//! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model` | [`Scene`] and [`Settings`] to what kernels read |
+//! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model`, `curvature` | [`Scene`] and [`Settings`] to what kernels read |
 //! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`measure`] | all of these | numeric experiments: kernels beside closed forms |

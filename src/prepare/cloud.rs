@@ -1,7 +1,7 @@
 //! The points of the cloud, spread over the surfaces that exchange light, and the tree that they are the leaves of.
 //!
-//! Each point stands for the same area of its set. Points go from triangle to triangle in the order of the BVH, which is one
-//! of places, so that small triangles share them evenly; of several candidates those stay that are far apart.
+//! Candidates go from triangle to triangle in the order of the BVH, which is one of places, so that small triangles share
+//! them evenly; of those stay the ones that are far apart, and each stands for about the same area of its set.
 
 use crate::{
     curvature::{
