@@ -1,10 +1,12 @@
 //! A rendered image: named channels of f32, what made it, and its files (EXR, PNG), written whole or not at all.
 
+mod difference;
 mod exr;
 mod merge;
 mod png;
 mod whole;
 
+pub use difference::Difference;
 pub use whole::{check_writable, write_whole};
 
 use crate::{Error, Result};
@@ -95,6 +97,35 @@ impl Image {
     /// channels.
     pub fn merge(parts: Vec<(std::path::PathBuf, Image)>) -> Result<Image> {
         merge::merge(parts)
+    }
+
+    /// How far R, G and B are from those of `reference`: of each pixel, and on average, the squared deviation over
+    /// `ref^2 + .01 mean(ref)^2`, averaged over the three, with the mean over pixels and channels. Its root is the
+    /// relative error that this crate speaks of.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if the images do not show the same pixels, a channel is missing, or the reference is black.
+    pub fn relative_mse(&self, reference: &Image) -> Result<Difference> {
+        difference::relative_mse(self, reference)
+    }
+
+    /// How different both look when one follows the other on a display, 0 to 1: FLIP of R, G and B times 2^`exposure`
+    /// over black, through the sRGB transfer function in 8 bits, seen at 67 pixels per degree. P. Andersson, J. Nilsson,
+    /// T. Akenine-Moller, M. Oskarsson, K. Astrom, M. D. Fairchild, "FLIP: A Difference Evaluator for Alternating
+    /// Images", HPG 2020.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if the images do not show the same pixels, or a channel is missing.
+    pub fn flip(&self, reference: &Image, exposure: f64) -> Result<Difference> {
+        difference::flip(self, reference, exposure)
+    }
+
+    /// R, G and B of every pixel as [`Image::flip`] sees them, 0 to 255 each.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if one is missing.
+    pub fn encoded(&self, exposure: f64) -> Result<Vec<u8>> {
+        difference::encoded(self, exposure)
     }
 
     /// What a file must not hold: a channel of another size, and NaN or infinity.

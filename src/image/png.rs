@@ -20,6 +20,11 @@ pub fn pixels(image: &Image, exposure: f64) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
+/// A value times 2^`exposure` through the sRGB transfer function, in 8 bits.
+pub fn encode(value: f32, exposure: f64) -> u8 {
+    byte(srgb(f64::from(value) * exposure.exp2()))
+}
+
 /// IEC 61966-2-1: linear to encoded, both 0 to 1.
 fn srgb(linear: f64) -> f64 {
     let linear = linear.clamp(0.0, 1.0);

@@ -6,6 +6,7 @@ mod boundary;
 mod common;
 mod curvature;
 mod density;
+mod difference;
 mod edge;
 mod light;
 mod model_errors;
