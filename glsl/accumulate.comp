@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "active.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "boundary.glsl"
@@ -65,11 +66,11 @@ vec3 directed(Material m, Seen s, vec3 delta, vec3 ni, vec3 wi, float shift) {
 }
 
 void main() {
-    uint index = pixel_index();
+    uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Surface surface = surfaces[surface_index(index)];
     bool covered = surface.triangle != MISS;
-    if (step_.count != 0) count_sample(index, covered);
+    if (step_.count != 0u) count_covered(index, covered);
     if (!covered || step_.ray_count == 0u) return;
 
     View view = views[0];

@@ -2,7 +2,6 @@
 // is in src/reference/emitter.rs.
 
 EMITTERS(readonly);
-EMITTER_CDF(readonly);
 
 // Radiance that a triangle sends against the unit vector `direction`, at the weights of its second and third vertex.
 vec3 emitted(uint triangle, vec2 barycentric, vec3 direction) {
@@ -46,16 +45,17 @@ EmitterPoint draw_emitter(View view, vec3 base, vec3 offset, vec2 u) {
     uint low = 0u, high = view.emitter_count;
     while (high - low > 1u) {
         uint middle = (low + high) / 2u;
-        if (emitter_cdf[middle] <= u.x)
+        if (emitters[middle].cumulative[0] <= u.x)
             low = middle;
         else
             high = middle;
     }
     EmitterPoint point;
-    point.triangle = emitters[low].triangle;
-    point.density = emitters[low].density;
+    Emitter emitter = emitters[low];
+    point.triangle = emitter.triangle;
+    point.density = emitter.density;
     // u.x is a multiple of 2^-24, and so stands for the middle of an interval of that width.
-    float rest = ((u.x - emitter_cdf[low]) + 2.98023223876953125e-8) / (emitter_cdf[low + 1u] - emitter_cdf[low]);
+    float rest = ((u.x - emitter.cumulative[0]) + 2.98023223876953125e-8) / (emitter.cumulative[1] - emitter.cumulative[0]);
     float s = sqrt(rest);
     point.barycentric = vec2(s - s * u.y, s * u.y);
     Triangle triangle = triangles[point.triangle];

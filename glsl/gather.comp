@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "active.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "boundary.glsl"
@@ -17,11 +18,11 @@ CLUSTERS(readonly);
 GATHERS(read_write);
 
 void main() {
-    uint index = pixel_index();
+    uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Surface surface = surfaces[surface_index(index)];
     bool covered = surface.triangle != MISS;
-    if (step_.count != 0) count_sample(index, covered);
+    if (step_.count != 0u) count_covered(index, covered);
     if (!covered) return;
     View view = views[0];
     Shading shading = shadings[surface.triangle];

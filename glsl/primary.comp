@@ -7,10 +7,15 @@
 #include "texture.glsl"
 #include "intersect.glsl"
 SURFACES(writeonly);
+ACTIVES(read_write);
 
 void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
+    if (step_.traced != 0u) {
+        if (index >= step_.traced) return;
+        index = actives[ACTIVE_HEADER + index];
+    }
     // A recording traces the strata of its first samples, whatever they are, and then each where it starts.
     if (RECORDED != 0 && step_.pixel_centre == 0 && step_.sample_index >= BATCHES
         && sample_index() / BATCHES % stratum_samples() != 0u) return;
@@ -41,4 +46,11 @@ void main() {
         surface.barycentric = hit_barycentric;
     }
     surfaces[surface_index(index)] = surface;
+    if (LISTED != 0 && step_.pixel_centre == 0 && (surface.triangle != MISS || view.show_environment != 0u)) {
+        // The next kernels get a workgroup more with the first of its pixels.
+        uint batch = sample_index() % BATCHES;
+        uint place = atomicAdd(actives[4u * batch + 3u], 1u);
+        if (place % gl_WorkGroupSize.x == 0u) atomicAdd(actives[4u * batch], 1u);
+        actives[ACTIVE_HEADER + (1u + batch) * step_.pixel_count + place] = index;
+    }
 }

@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "active.glsl"
 #include "boundary.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
@@ -35,23 +36,12 @@ float visible_normal_density(float alpha, vec3 wo, vec3 wi) {
     return ggx_distribution(alpha, h) / ((1.0 + ggx_lambda(alpha, wo)) * 4.0 * wo.z);
 }
 
-void add_reflection(uint index, vec3 radiance) {
-    vec3 sum = running_sums[index].reflection, carry = running_sums[index].reflection_carry;
-    if (!addable(radiance, sum)) {
-        count_invalid(index);
-        return;
-    }
-    compensated_add(sum, carry, radiance);
-    running_sums[index].reflection = sum;
-    running_sums[index].reflection_carry = carry;
-}
-
 void main() {
-    uint index = pixel_index();
+    uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Surface surface = surfaces[surface_index(index)];
     View view = views[0];
-    if (step_.count != 0) count_sample(index, surface.triangle != MISS);
+    if (step_.count != 0u) count_covered(index, surface.triangle != MISS);
     vec3 radiance = vec3(0.0);
     if (surface.triangle == MISS) {
         if (view.show_environment == 0 || step_.first == 0) return;

@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "active.glsl"
 #include "texture.glsl"
 #include "intersect.glsl"
 SURFACES(readonly);
@@ -11,7 +12,7 @@ PROBES(readonly);
 HIT_LISTS(writeonly);
 
 void main() {
-    uint index = pixel_index();
+    uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Probe probe = probes[index];
     Surface surface = surfaces[surface_index(index)];

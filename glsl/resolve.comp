@@ -10,6 +10,13 @@ PROGRESSES(readonly);
 PIXELS(writeonly);
 COLORS(writeonly);
 
+// Sum of batch `b`.
+vec3 batch_sum(uint b, uint index) {
+    vec3 sum = batch_sums[b * step_.pixel_count + index];
+    if (BATCHED > 1 && step_.all_light != 0u) sum += batch_sums[(BATCHES + b) * step_.pixel_count + index];
+    return sum;
+}
+
 // Samples below `end` of batch `b`.
 uint samples_of_batch(uint b, uint end) {
     return (end + BATCHES - 1u - b) / BATCHES;
@@ -20,7 +27,7 @@ void main() {
     if (index >= step_.pixel_count) return;
     Sums sums = running_sums[index];
     uint begin = RECORDED != 0 ? progresses[0].begin : step_.range_begin;
-    uint end = RECORDED != 0 ? progresses[0].end : step_.range_end;
+    uint end = begin + sums.samples;
     Pixel pixel;
     float n = float(max(sums.samples, 1u));
     // Divided first: sum and carry together may exceed f32.
@@ -28,16 +35,15 @@ void main() {
     pixel.reflection = clamp_finite(max(sums.reflection / n + sums.reflection_carry / n, vec3(0.0)));
     pixel.variance = vec3(0.0);
     if (BATCHED != 0) {
-        float samples = max(float(end - begin), 1.0);
         vec3 mean = vec3(0.0);
-        for (uint b = 0; b < BATCHES; b++) mean += batch_sums[b * step_.pixel_count + index] / samples;
+        for (uint b = 0; b < BATCHES; b++) mean += batch_sum(b, index) / n;
         // Relative to the largest deviation, whose square may exceed f32.
         vec3 largest = vec3(0.0);
         vec3 deviation[BATCHES];
         float n_b[BATCHES];
         for (uint b = 0; b < BATCHES; b++) {
             n_b[b] = float(samples_of_batch(b, end) - samples_of_batch(b, begin));
-            deviation[b] = batch_sums[b * step_.pixel_count + index] / max(n_b[b], 1.0) - mean;
+            deviation[b] = batch_sum(b, index) / max(n_b[b], 1.0) - mean;
             largest = max(largest, abs(deviation[b]));
         }
         vec3 scale = max(largest, vec3(1e-30));
@@ -46,7 +52,7 @@ void main() {
             vec3 relative = deviation[b] / scale;
             squares += n_b[b] * relative * relative;
         }
-        pixel.variance = clamp_finite(squares / (float(BATCHES - 1u) * samples) * scale * scale);
+        pixel.variance = clamp_finite(squares / (float(BATCHES - 1u) * n) * scale * scale);
     }
     pixel.alpha = float(sums.covered) / n;
     pixel.samples = sums.samples;

@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "active.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "projection.glsl"
@@ -14,7 +15,7 @@ SURFACES(readonly);
 PROBES(writeonly);
 
 void main() {
-    uint index = pixel_index();
+    uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Probe probe;
     probe.offset = vec3(0.0);

@@ -48,6 +48,8 @@ const uint POINTS_ROW = 4294967295u;
 const uint SEVERAL = 4294967295u;
 // Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
 const uint BVH_DEPTH = 24u;
+// Words before the lists of Actives: four for each batch.
+const uint ACTIVE_HEADER = 32u;
 // Value of `Surface::triangle` for a ray that hits nothing.
 const uint MISS = 4294967295u;
 // Integrator: probes, whose hits are lit.
@@ -248,7 +250,7 @@ const uint FUNCTION_ADD = 42u;
 layout(constant_id = 1) const uint PROJECTION = 0;
 // One of ENVIRONMENT_*.
 layout(constant_id = 2) const uint ENVIRONMENT_KIND = 0;
-// 1 where sums are kept by batch, for the variance.
+// 1 where sums of subsurface light are kept by batch, for the variance; 2 where also those of reflected light are.
 layout(constant_id = 3) const uint BATCHED = 0;
 // 1 to count traversal steps (tests and benchmarks).
 layout(constant_id = 4) const uint COUNT_STEPS = 0;
@@ -260,6 +262,8 @@ layout(constant_id = 9) const uint ROUGH = 0;
 layout(constant_id = 7) const uint TEXTURED = 0;
 // Bit 1 << MODEL_X for each model X of the translucent materials that the scene shows.
 layout(constant_id = 5) const uint MODELS = 0;
+// 1 where kernels work on lists of pixels, without those that see nothing.
+layout(constant_id = 8) const uint LISTED = 0;
 // 1 where profiles depend on the curvature of the surface that is seen.
 layout(constant_id = 10) const uint CURVATURE = 0;
 // 1 where a caller's recordings keep count of the samples on the device.
@@ -339,11 +343,16 @@ struct Step {
     uint first;
     // 1 in the sample's last dispatch of `gather`.
     uint last;
-    // 1 in the sample's first dispatch of all that add to the sums: it counts the sample.
+    // 1 in the sample's first dispatch of all that add to the sums: it counts whether the pixel is covered. Of `count`,
+    // the samples that it adds.
     uint count;
-    // First sample of the whole range that is in the sums, for `resolve`; of those that light the cloud.
+    // Pixels that `primary` and `count` take from the list of those to trace; 0 for all of the band.
+    uint traced;
+    // 1 for the variance of all light from `resolve`, 0 for that of subsurface light.
+    uint all_light;
+    // First sample in the sums, for `resolve`; of those that light the cloud.
     uint range_begin;
-    // End of that range.
+    // End of those that light the cloud.
     uint range_end;
     // Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from.
     uint node;
@@ -574,6 +583,8 @@ struct Emitter {
     uint triangle;
     // Probability that a point is drawn on it, over its area.
     float density;
+    // Probability of those before it, and with its own; multiples of 2^-24.
+    float cumulative[2];
 };
 
 // The surface a camera ray meets first (the G-buffer), written by `primary`.
@@ -657,7 +668,7 @@ struct Pixel {
 #define HIT_LISTS(access) layout(set = 0, binding = 10, scalar) access buffer HitListsBlock { Hits hit_lists[]; }
 // One per pixel of the band.
 #define RUNNING_SUMS(access) layout(set = 0, binding = 11, scalar) access buffer RunningSumsBlock { Sums running_sums[]; }
-// Subsurface sum of each batch: batch * pixel_count + pixel.
+// Subsurface sum of each batch: batch * pixel_count + pixel. Then, where they are kept, those of reflected light.
 #define BATCH_SUMS(access) layout(set = 0, binding = 12, scalar) access buffer BatchSumsBlock { vec3 batch_sums[]; }
 // The finished band.
 #define PIXELS(access) layout(set = 0, binding = 13, scalar) access buffer PixelsBlock { Pixel pixels[]; }
@@ -665,8 +676,9 @@ struct Pixel {
 #define COUNTERS(access) layout(set = 0, binding = 14, scalar) access buffer CountersBlock { uint counters[]; }
 // Emissive triangles, by rising index.
 #define EMITTERS(access) layout(set = 0, binding = 15, scalar) access buffer EmittersBlock { Emitter emitters[]; }
-// Cumulative probability of the emitters, emitter_count + 1 multiples of 2^-24 from 0 to 1.
-#define EMITTER_CDF(access) layout(set = 0, binding = 16, scalar) access buffer EmitterCdfBlock { float emitter_cdf[]; }
+// Of each batch the arguments of an indirect dispatch (three words) and how many pixels see something; then the pixels
+// to trace, then of each batch those that see something, pixel_count at most.
+#define ACTIVES(access) layout(set = 0, binding = 16, scalar) access buffer ActivesBlock { uint actives[]; }
 // 256 numbers, the decoding of sRGB bytes; then the texels of all textures, red in the lowest byte, alpha in the highest.
 #define TEXELS(access) layout(set = 0, binding = 17, scalar) access buffer TexelsBlock { uint texels[]; }
 // TEXTURE_KINDS entries for each material.

@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "active.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "boundary.glsl"
@@ -49,7 +50,7 @@ vec3 draw_direction(Material m, vec3 chances, vec3 d, vec3 n, vec2 u) {
 }
 
 void main() {
-    uint index = pixel_index();
+    uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Surface surface = surfaces[surface_index(index)];
     if (surface.triangle == MISS) return;

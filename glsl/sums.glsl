@@ -3,8 +3,7 @@
 RUNNING_SUMS(read_write);
 BATCH_SUMS(read_write);
 
-void count_sample(uint index, bool covered) {
-    running_sums[index].samples++;
+void count_covered(uint index, bool covered) {
     running_sums[index].covered += covered ? 1u : 0u;
 }
 
@@ -41,4 +40,20 @@ void add_subsurface(uint index, vec3 radiance) {
     compensated_add(sum, carry, radiance);
     running_sums[index].subsurface = sum;
     running_sums[index].subsurface_carry = carry;
+}
+
+// Adds light of the first surface to the sums of the pixel and, where they are kept, of the sample's batch.
+void add_reflection(uint index, vec3 radiance) {
+    vec3 sum = running_sums[index].reflection, carry = running_sums[index].reflection_carry;
+    uint batch_index = (BATCHES + sample_index() % BATCHES) * step_.pixel_count + index;
+    vec3 batch_sum = vec3(0.0);
+    if (BATCHED > 1) batch_sum = batch_sums[batch_index];
+    if (!addable(radiance, sum) || !addable(radiance, batch_sum)) {
+        count_invalid(index);
+        return;
+    }
+    if (BATCHED > 1) batch_sums[batch_index] = batch_sum + radiance;
+    compensated_add(sum, carry, radiance);
+    running_sums[index].reflection = sum;
+    running_sums[index].reflection_carry = carry;
 }

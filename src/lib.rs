@@ -29,7 +29,7 @@
 //! file ─ scene ─► Scene ── prepare ─► Features ──────────────────────────────► kernels, specialised
 //!   (checked, f64 metres;  (f32,      Nodes Triangles Shadings Materials
 //!    geometry centred and   internal  Lights Environment EnvironmentCdf ─────► buffers   per scene
-//!    scaled)                units)    Emitters EmitterCdf Boundaries
+//!    scaled)                units)    Emitters Boundaries
 //!                                     Texels Textures Coordinates
 //!                                     Profiles Thickness Balances Mixtures
 //!                                     View ──────────────────────────────────► buffer    per render
@@ -56,7 +56,7 @@
 //! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups.
 //!
 //! *Recordings.* [`Renderer::record`] puts the same dispatches into a command buffer of the caller's, on a device of his
-//! ([`Device::from_raw`]). There `begin` numbers the samples and `clear` forgets the sums if they do not go on, so what
+//! ([`Device::from_raw`]). There `begin` numbers the samples and `count` forgets the sums if they do not go on, so what
 //! the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
 //!
 //! *Changes.* Buffers stay when camera, lights, matter, environment or textures change ([`Renderer::update`], and the
@@ -127,6 +127,6 @@ pub use ash;
 pub use error::{Error, Result};
 pub use gpu::{Device, DeviceInfo, DeviceOptions};
 pub use image::Image;
-pub use render::{Progress, Renderer};
+pub use render::{Goal, Outcome, Progress, Renderer, Stop};
 pub use scene::{Environment, LoadOptions, Scene};
 pub use settings::{CameraChoice, Model, Normalisation, Projection, Settings, SingleScattering};

@@ -29,7 +29,6 @@ pub struct Prepared {
     pub materials: Vec<Material>,
     pub lights: Vec<Light>,
     pub emitters: Vec<Emitter>,
-    pub emitter_cdf: Vec<f32>,
     /// Tables of rough boundaries.
     pub boundaries: Vec<f32>,
     pub environment: Vec<Vec3>,
@@ -83,7 +82,6 @@ impl Prepared {
             materials: &self.materials,
             lights: &self.lights,
             emitters: &self.emitters,
-            emitter_cdf: &self.emitter_cdf,
             boundaries: &self.boundaries,
             environment: &self.environment,
             environment_cdf: &self.environment_cdf,
@@ -172,7 +170,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     };
     let Matter { materials, profiles, boundaries, rough_rows, thickness, balances, mixtures, clusters } = matter;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
-    let (emitters, emitter_cdf) = emitter::table(&scene.triangles, &scene.shadings, &materials);
+    let emitters = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
     let mut view = view_of(&camera, frame, width, height);
     view.crop_x = x0;
@@ -221,7 +219,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     let features = Features {
         projection: settings.projection as u32,
         environment: kind,
-        batches: u32::from(settings.variance),
+        batches: u32::from(settings.variance || settings.estimate_error),
         models,
         emitters: u32::from(emits),
         textures: kinds,
@@ -247,7 +245,6 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         ray_count: features.rays(&view),
         lights,
         emitters,
-        emitter_cdf,
         boundaries,
         environment,
         environment_cdf,

@@ -232,6 +232,11 @@ pub struct Settings {
     pub show_environment: bool,
     /// Keeps the sums of each batch, from which the variance comes; of no use below `shared::BATCHES` samples.
     pub variance: bool,
+    /// Keeps also the sums of each batch of reflected light, so that [`Renderer::render_until`] can estimate the error
+    /// of all light.
+    ///
+    /// [`Renderer::render_until`]: crate::Renderer::render_until
+    pub estimate_error: bool,
     /// Share of the profile's energy beyond the ball in which probes look for surfaces; 0 has no ball.
     /// `mis` and `normal` miss at most this share of the light. Their other biases are the lift of shadow rays
     /// ([`shared::SHADOW_OFFSET`]) and, for matter that f32 cannot resolve, a mean free path kept within its reach.
@@ -267,6 +272,7 @@ impl Default for Settings {
             seed: 0,
             show_environment: false,
             variance: true,
+            estimate_error: false,
             radius_tail: 1e-6,
             band_pixels: None,
             recording: false,

@@ -272,7 +272,10 @@ impl Drop for BufferMemory {
 /// How every buffer is made: usable in every way that kernels and copies need.
 pub(super) fn create_info(bytes: u64) -> vk::BufferCreateInfo<'static> {
     vk::BufferCreateInfo::default().size(bytes).usage(
-        vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
+        vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::INDIRECT_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST,
     )
 }
 

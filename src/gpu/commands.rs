@@ -14,6 +14,16 @@ pub struct Timestamps {
     pub first: u32,
 }
 
+/// How many invocations a dispatch has.
+#[derive(Clone, Copy)]
+pub enum Extent<'a> {
+    /// At least as many, in as many workgroups as that needs; in two dimensions where one is not enough (see
+    /// [`Kernel::new`]).
+    Invocations(u32),
+    /// Those of the workgroups that a VkDispatchIndirectCommand says, so many bytes from the start of the buffer.
+    Indirect(&'a Buffer, u64),
+}
+
 /// A command buffer in the recording state. Nothing here submits or waits.
 pub struct Commands {
     pub(super) handles: Arc<Handles>,
@@ -38,9 +48,10 @@ impl Commands {
         let barrier = vk::MemoryBarrier2::default()
             .src_stage_mask(stages)
             .src_access_mask(vk::AccessFlags2::SHADER_STORAGE_WRITE | vk::AccessFlags2::TRANSFER_WRITE)
-            .dst_stage_mask(stages)
+            .dst_stage_mask(stages | vk::PipelineStageFlags2::DRAW_INDIRECT)
             .dst_access_mask(
-                vk::AccessFlags2::SHADER_STORAGE_READ
+                vk::AccessFlags2::INDIRECT_COMMAND_READ
+                    | vk::AccessFlags2::SHADER_STORAGE_READ
                     | vk::AccessFlags2::SHADER_STORAGE_WRITE
                     | vk::AccessFlags2::TRANSFER_READ
                     | vk::AccessFlags2::TRANSFER_WRITE,
@@ -88,21 +99,24 @@ impl Commands {
         unsafe { self.handles.device.cmd_reset_query_pool(self.raw, times.pool, times.first, count) };
     }
 
-    /// Runs `kernel` with at least `invocations` invocations, as many workgroups as that needs; in two dimensions where
-    /// one is not enough (see [`Kernel::new`]). `times` gets the times before and after.
+    /// Runs `kernel`. `times` gets the times before and after.
     ///
     /// # Panics
-    /// With objects of another device.
+    /// With objects of another device, or where indirect arguments are not within their buffer.
     pub fn dispatch(
         &self,
         kernel: &Kernel,
         bindings: &Bindings,
-        invocations: u32,
+        extent: Extent,
         step: &Step,
         times: Option<Timestamps>,
     ) {
         assert!(kernel.objects.layout.objects.is_of(&self.handles) && bindings.objects.is_of(&self.handles));
-        let [columns, rows] = self.handles.groups(invocations, kernel.objects.workgroup);
+        if let Extent::Indirect(buffer, offset) = extent {
+            assert!(buffer.memory.is_of(&self.handles));
+            let end = offset + size_of::<vk::DispatchIndirectCommand>() as u64;
+            assert!(offset.is_multiple_of(4) && end <= buffer.bytes(), "arguments are within their buffer");
+        }
         let layout = kernel.objects.layout.objects.pipeline;
         let (device, commands) = (&self.handles.device, self.raw);
         self.begin_label(&kernel.objects.label);
@@ -118,7 +132,13 @@ impl Commands {
             if let Some(Timestamps { pool, first }) = times {
                 device.cmd_write_timestamp2(commands, stage, pool, first);
             }
-            device.cmd_dispatch(commands, columns, rows, 1);
+            match extent {
+                Extent::Invocations(count) => {
+                    let [columns, rows] = self.handles.groups(count, kernel.objects.workgroup);
+                    device.cmd_dispatch(commands, columns, rows, 1);
+                }
+                Extent::Indirect(buffer, offset) => device.cmd_dispatch_indirect(commands, buffer.memory.raw, offset),
+            }
             if let Some(Timestamps { pool, first }) = times {
                 device.cmd_write_timestamp2(commands, stage, pool, first + 1);
             }
@@ -135,6 +155,22 @@ impl Commands {
         assert!(buffer.memory.is_of(&self.handles));
         // SAFETY: the recording is open, the buffer is of this device and outlives it.
         unsafe { self.handles.device.cmd_fill_buffer(self.raw, buffer.memory.raw, 0, vk::WHOLE_SIZE, word) };
+        self.barrier();
+    }
+
+    /// Writes `words` into `buffer`, `offset` bytes from its start.
+    ///
+    /// # Panics
+    /// Beyond the buffer's end, or with a buffer of another device.
+    pub fn update(&self, buffer: &Buffer, offset: u64, words: &[u32]) {
+        assert!(buffer.memory.is_of(&self.handles));
+        let data: &[u8] = bytemuck::cast_slice(words);
+        assert!(
+            data.len() <= 1 << 16 && offset + data.len() as u64 <= buffer.bytes(),
+            "an update stays within its buffer"
+        );
+        // SAFETY: the recording is open, the buffer is of this device and outlives it, and the range is within it.
+        unsafe { self.handles.device.cmd_update_buffer(self.raw, buffer.memory.raw, offset, data) };
         self.barrier();
     }
 

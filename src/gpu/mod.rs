@@ -22,7 +22,7 @@ mod requirements;
 
 pub use buffer::{Buffer, Location, download, download_to, upload};
 pub use clock::{Clock, Moment};
-pub use commands::{Commands, Timestamps};
+pub use commands::{Commands, Extent, Timestamps};
 pub use counters::Counter;
 pub use device::{Device, DeviceOptions, RawDevice};
 pub use executables::{Executable, Statistic};

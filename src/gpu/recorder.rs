@@ -4,7 +4,7 @@ use super::{
     During,
     buffer::Buffer,
     clock::Clock,
-    commands::{Commands, Timestamps},
+    commands::{Commands, Extent, Timestamps},
     counters::Queries,
     device::{Device, Handles},
     kernel::{Bindings, Kernel},
@@ -142,9 +142,19 @@ impl Recorder {
     /// # Panics
     /// Outside a recording, or with objects of another device.
     pub fn dispatch(&mut self, kernel: &Kernel, bindings: &Bindings, invocations: u32, step: &Step) {
+        self.dispatch_extent(kernel, bindings, Extent::Invocations(invocations), step);
+    }
+
+    /// As [`Recorder::dispatch`], of any extent.
+    ///
+    /// # Panics
+    /// Outside a recording, or as [`Commands::dispatch`].
+    pub fn dispatch_extent(&mut self, kernel: &Kernel, bindings: &Bindings, extent: Extent, step: &Step) {
         self.check();
-        if invocations == 0 {
-            return;
+        match extent {
+            Extent::Invocations(0) => return,
+            Extent::Invocations(_) => (),
+            Extent::Indirect(buffer, _) => self.hold(&buffer.memory),
         }
         self.hold(&kernel.objects);
         self.hold(&bindings.objects);
@@ -155,7 +165,7 @@ impl Recorder {
             // SAFETY: the recording is open; the profiling lock is held since before it began, and the query was reset.
             unsafe { device.cmd_begin_query(raw, pool, query, vk::QueryControlFlags::empty()) };
         }
-        self.commands.dispatch(kernel, bindings, invocations, step, times);
+        self.commands.dispatch(kernel, bindings, extent, step, times);
         if let Some((pool, query)) = counters {
             // SAFETY: the query was begun just above.
             unsafe { device.cmd_end_query(raw, pool, query) };
@@ -170,6 +180,16 @@ impl Recorder {
         self.check();
         self.hold(&buffer.memory);
         self.commands.fill(buffer, word);
+    }
+
+    /// Writes `words` into `buffer`, `offset` bytes from its start.
+    ///
+    /// # Panics
+    /// Outside a recording, or as [`Commands::update`].
+    pub fn update(&mut self, buffer: &Buffer, offset: u64, words: &[u32]) {
+        self.check();
+        self.hold(&buffer.memory);
+        self.commands.update(buffer, offset, words);
     }
 
     /// Copies the first `bytes` of `source` to the start of `target`, another buffer.

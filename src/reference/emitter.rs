@@ -31,14 +31,14 @@ use glam::{DVec2, DVec3};
 /// Probabilities are multiples of its inverse.
 const STEPS: f64 = (1 << 24) as f64;
 
-/// The triangles that emit, and the cumulative probability of their draw.
-pub fn table(triangles: &[Triangle], shadings: &[Shading], materials: &[Material]) -> (Vec<Emitter>, Vec<f32>) {
+/// The triangles that emit, with the probabilities of their draw.
+pub fn table(triangles: &[Triangle], shadings: &[Shading], materials: &[Material]) -> Vec<Emitter> {
     let power = |index: usize| {
         let radiance = materials[shadings[index].material as usize].emission.as_dvec3().element_sum();
         if radiance > 0.0 { radiance * area(&triangles[index]) } else { 0.0 }
     };
     let total: f64 = (0..triangles.len()).map(power).sum();
-    let (mut emitters, mut cdf) = (vec![], vec![0.0]);
+    let mut emitters = vec![];
     let (mut sum, mut last) = (0.0, 0.0);
     if total > 0.0 {
         for (index, triangle) in triangles.iter().enumerate() {
@@ -46,13 +46,13 @@ pub fn table(triangles: &[Triangle], shadings: &[Shading], materials: &[Material
             let next = (sum / total * STEPS).round();
             if next > last {
                 let density = (next - last) / STEPS / area(triangle);
-                emitters.push(Emitter { triangle: index as u32, density: density as f32 });
-                cdf.push((next / STEPS) as f32);
+                let cumulative = [last, next].map(|step: f64| (step / STEPS) as f32);
+                emitters.push(Emitter { triangle: index as u32, density: density as f32, cumulative });
                 last = next;
             }
         }
     }
-    if emitters.is_empty() { (vec![], vec![]) } else { (emitters, cdf) }
+    emitters
 }
 
 fn area(triangle: &Triangle) -> f64 {
@@ -75,13 +75,12 @@ pub struct Point {
 
 /// The point that two numbers in [0, 1) pick, seen from `x`.
 pub fn draw(inputs: &Inputs, x: DVec3, u1: f64, u2: f64) -> Point {
-    let cdf = inputs.emitter_cdf;
-    let k = cdf.partition_point(|&c| f64::from(c) <= u1) - 1;
-    let (low, high) = (f64::from(cdf[k]), f64::from(cdf[k + 1]));
+    let chosen = inputs.emitters.partition_point(|emitter| f64::from(emitter.cumulative[1]) <= u1);
+    let Emitter { triangle, cumulative, .. } = inputs.emitters[chosen];
+    let [low, high] = cumulative.map(f64::from);
     // The middle of the interval for which u1 stands.
     let s = ((u1 + 0.5 / STEPS - low) / (high - low)).sqrt();
     let barycentric = DVec2::new(s * (1.0 - u2), s * u2);
-    let triangle = inputs.emitters[k].triangle;
     let shape = &inputs.triangles[triangle as usize];
     let [corner, edge1, edge2] = shape.corner_and_edges();
     let to = corner + barycentric.x * edge1 + barycentric.y * edge2 - x;

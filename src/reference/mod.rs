@@ -8,8 +8,8 @@ pub mod accumulate;
 pub mod area;
 pub mod begin;
 pub mod boundary;
-pub mod clear;
 pub mod cluster;
+pub mod count;
 pub mod emitter;
 pub mod gather;
 pub mod intersect;
@@ -53,7 +53,6 @@ pub struct Inputs<'a> {
     pub lights: &'a [Light],
     /// Triangles that emit light, and the table from which they are drawn; see [`emitter`].
     pub emitters: &'a [Emitter],
-    pub emitter_cdf: &'a [f32],
     /// Texels of the environment image, empty if there is none.
     pub environment: &'a [Vec3],
     /// Its sampling table; see [`Slot::EnvironmentCdf`](crate::shared::Slot::EnvironmentCdf).
@@ -115,7 +114,8 @@ fn render_pixel(inputs: &Inputs, index: u32, rows: Range<u32>, samples: Range<u3
         let subsurface = accumulate::accumulate(inputs, &step, index, &surface, &probe, &hits);
         subsurface.add_subsurface(&step, &surface, &mut sums, &mut batch_sums[batch]);
         let reflection = reflect::reflect(inputs, &step, index, &surface);
-        reflection.add_reflection(&mut sums);
+        reflection.add_reflection(&mut sums, &mut Vec3::ZERO.clone());
+        sums.samples += 1;
         let once = single::single(inputs, &step, index, &surface);
         once.add_single(&mut sums, &mut batch_sums[batch]);
     }

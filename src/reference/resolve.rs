@@ -17,14 +17,14 @@ pub fn batch_count(begin: u32, end: u32, batch: u32) -> u32 {
     before(end) - before(begin)
 }
 
-/// The pixel of its sums; `batch_sums` is empty or holds one sum per batch.
+/// The pixel of its sums; `batch_sums` is empty or holds one sum per batch, of the light whose variance is asked for.
 pub fn resolve(features: &Features, step: &Step, sums: &Sums, batch_sums: &[Vec3]) -> Pixel {
     let count = f64::from(sums.samples.max(1));
     let mean = |sum: Vec3, carry: Vec3| finite((sum.as_dvec3() + carry.as_dvec3()) / count);
     Pixel {
         subsurface: mean(sums.subsurface, sums.subsurface_carry),
         reflection: mean(sums.reflection, sums.reflection_carry),
-        variance: if features.batches != 0 { finite(variance(step, batch_sums)) } else { Vec3::ZERO },
+        variance: if features.batches != 0 { finite(variance(step, sums.samples, batch_sums)) } else { Vec3::ZERO },
         alpha: (f64::from(sums.covered) / count) as f32,
         samples: sums.samples,
         invalid: sums.invalid,
@@ -36,14 +36,14 @@ fn finite(x: DVec3) -> Vec3 {
     x.min(DVec3::splat(f32::MAX.into())).as_vec3()
 }
 
-fn variance(step: &Step, batch_sums: &[Vec3]) -> DVec3 {
-    let total = f64::from(step.range_end - step.range_begin);
+fn variance(step: &Step, samples: u32, batch_sums: &[Vec3]) -> DVec3 {
+    let total = f64::from(samples);
     if total < f64::from(BATCHES) {
         return DVec3::ZERO;
     }
     let mean = batch_sums.iter().map(|s| s.as_dvec3()).sum::<DVec3>() / total;
     let spread = |(batch, sum): (u32, &Vec3)| {
-        let count = f64::from(batch_count(step.range_begin, step.range_end, batch));
+        let count = f64::from(batch_count(step.range_begin, step.range_begin + samples, batch));
         count * (sum.as_dvec3() / count - mean).powf(2.0)
     };
     (0..).zip(batch_sums).map(spread).sum::<DVec3>() / f64::from(BATCHES - 1) / total

@@ -27,7 +27,6 @@ impl Contribution {
     pub fn add_subsurface(&self, step: &Step, surface: &Surface, sums: &mut Sums, batch_sum: &mut Vec3) {
         self.add_single(sums, batch_sum);
         if step.count != 0 {
-            sums.samples += 1;
             sums.covered += u32::from(surface.triangle != MISS);
         }
     }
@@ -43,12 +42,14 @@ impl Contribution {
         sums.invalid += u32::from(!fits);
     }
 
-    /// Adds to the sums of a pixel as `reflect.comp` does.
-    pub fn add_reflection(&self, sums: &mut Sums) {
+    /// Adds to the sums of a pixel as `reflect.comp` does. `batch_sum` is that of reflected light of the sample's batch;
+    /// where the kernel keeps none, a caller's to forget.
+    pub fn add_reflection(&self, sums: &mut Sums, batch_sum: &mut Vec3) {
         let radiance = self.radiance.as_vec3();
-        let fits = !self.invalid && (sums.reflection + radiance).is_finite();
+        let fits = !self.invalid && (sums.reflection + radiance).is_finite() && (*batch_sum + radiance).is_finite();
         if fits {
             add(&mut sums.reflection, &mut sums.reflection_carry, radiance);
+            *batch_sum += radiance;
         }
         sums.invalid += u32::from(!fits);
     }

@@ -38,14 +38,12 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     let mut invalid = 0u64;
     for band in 0..renderer.bands.len() {
         renderer.make_resident(band)?;
-        let end = renderer.bands[band].end;
         let pixels = renderer.bands[band].pixels;
         let step = Step {
             first_row: renderer.bands[band].first_row,
             pixel_count: pixels,
             pixel_centre: 1,
             range_begin: range.start,
-            range_end: end,
             ..Step::default()
         };
         // The G-buffer of batch 0 is overwritten; its stratum is traced anew before the next sample.

@@ -5,11 +5,14 @@ use crate::{
     error::{Error, Result},
     prepare::Prepared,
     settings::Settings,
-    shared::{BATCHES, GATHER_POINTS, Slot},
+    shared::{ACTIVE_HEADER, BATCHES, Features, GATHER_POINTS, Slot},
 };
 
 /// Pixels of a band where nothing else limits it: enough to fill a GPU, few enough for a processor's caches.
 const BAND_PIXELS: u32 = 1 << 18;
+
+/// Workgroups of one dimension that every device allows (Vulkan 1.3, table 58).
+const GROUPS: u64 = 65_535;
 
 /// Consecutive rows that the device works on at a time.
 pub struct Band {
@@ -24,6 +27,8 @@ pub struct Band {
     pub sums: [Vec<u8>; 2],
     /// End of the samples in `sums`; none before they were on the host.
     pub kept: Option<u32>,
+    /// Samples were added since.
+    pub changed: bool,
 }
 
 impl Band {
@@ -33,6 +38,7 @@ impl Band {
             Some(end) => (Film::OnHost, end),
             None => (Film::Empty, begin),
         };
+        self.changed = false;
     }
 
     /// Gives the memory of the sums back.
@@ -67,21 +73,38 @@ pub fn slots(prepared: &Prepared) -> Vec<Slot> {
     if prepared.features.recorded != 0 {
         slots.push(Slot::Colors);
     }
+    if prepared.features.listed != 0 {
+        slots.push(Slot::Actives);
+    }
     slots
 }
 
 /// Bytes that a slot takes for each pixel of a band.
-pub fn bytes_per_pixel(slot: Slot) -> u64 {
-    let elements = if matches!(slot, Slot::Surfaces | Slot::BatchSums) { BATCHES } else { 1 };
+pub fn bytes_per_pixel(slot: Slot, features: &Features) -> u64 {
+    let elements = match slot {
+        Slot::Surfaces => BATCHES,
+        Slot::BatchSums => BATCHES * features.batches,
+        Slot::Actives => BATCHES + 1,
+        _ => 1,
+    };
     u64::from(elements) * slot.stride() as u64
+}
+
+/// Bytes of a slot for a band of `pixels`.
+pub fn bytes(slot: Slot, features: &Features, pixels: u32) -> u64 {
+    let header = if slot == Slot::Actives { ACTIVE_HEADER } else { 0 };
+    u64::from(header) * slot.stride() as u64 + bytes_per_pixel(slot, features) * u64::from(pixels)
 }
 
 /// Cuts the rendered rows into bands of nearly equal size.
 pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result<Vec<Band>> {
     let slots = slots(prepared);
-    let widest = slots.iter().map(|slot| bytes_per_pixel(*slot)).max().unwrap_or(1);
-    let whole: u64 = slots.iter().map(|slot| bytes_per_pixel(*slot)).sum();
-    let limit = limits.buffer_bytes / widest;
+    let each = |slot: &Slot| bytes_per_pixel(*slot, &prepared.features);
+    let widest = slots.iter().map(each).max().unwrap_or(1);
+    let whole: u64 = slots.iter().map(each).sum();
+    // An indirect dispatch has one dimension, of the workgroups that every device allows.
+    let dispatched = if prepared.features.listed != 0 { GROUPS * u64::from(settings.workgroup) } else { u64::MAX };
+    let limit = (limits.buffer_bytes / widest).min(dispatched);
     let width = prepared.view.crop_width;
     // Half of the memory is left to the scene and to others. Whether it suffices at all is asked later.
     let memory = limits.heap_bytes.min(if limits.shared { limits.host_bytes } else { u64::MAX });
@@ -109,7 +132,7 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
             let (first, end) = (edge(band), edge(band + 1));
             let pixels = (end - first) * width;
             let first_row = prepared.rows.start + first;
-            Band { first_row, pixels, end: 0, film: Film::Empty, sums: Default::default(), kept: None }
+            Band { first_row, pixels, end: 0, film: Film::Empty, sums: Default::default(), kept: None, changed: false }
         })
         .collect())
 }

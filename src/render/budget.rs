@@ -25,7 +25,11 @@ struct Need {
 /// Bytes of the sums that a render keeps on the host for these bands.
 pub fn waiting_bytes(prepared: &Prepared, bands: impl Iterator<Item = u32>) -> u64 {
     let made = bands::slots(prepared);
-    let each: u64 = SUMS.into_iter().filter(|slot| made.contains(slot)).map(bands::bytes_per_pixel).sum();
+    let each: u64 = SUMS
+        .into_iter()
+        .filter(|slot| made.contains(slot))
+        .map(|slot| bands::bytes_per_pixel(slot, &prepared.features))
+        .sum();
     bands.map(|pixels| u64::from(pixels) * each).sum()
 }
 

@@ -1,5 +1,6 @@
 //! The renderer: buffers made once per scene and resolution, and the order of the kernels.
 
+mod adaptive;
 mod assemble;
 mod bands;
 mod budget;
@@ -10,12 +11,13 @@ mod sums;
 mod timing;
 mod update;
 
+pub use adaptive::{Goal, Outcome, Stop};
 pub use plan::{BufferUse, KernelUse, Limits, Plan, value_name};
 pub use record::Output;
 
 use crate::{
     error::{Error, Result},
-    gpu::{Bindings, Buffer, Device, Kernel, Layout, Location, Recorder, download, upload},
+    gpu::{Bindings, Buffer, Device, Extent, Kernel, Layout, Location, Recorder, download, upload},
     image::Image,
     prepare::{Prepared, prepare},
     reference::random,
@@ -65,15 +67,17 @@ macro_rules! kernels {
             &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
     };
 }
-kernels!(begin, clear, irradiance, cluster, primary, sample, reproject, accumulate, gather, reflect, single, resolve);
+kernels!(begin, count, irradiance, cluster, primary, sample, reproject, accumulate, gather, reflect, single, resolve);
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Pixel samples done, over all bands.
     pub done: u64,
-    /// Pixel samples asked for.
+    /// Pixel samples asked for; where an error is, those that it is expected to take.
     pub total: u64,
+    /// The estimated error of the image, sqrt(relMSE), where one is asked for; none before the first estimate.
+    pub error: Option<f64>,
 }
 
 /// Renders one scene with one set of settings. Samples add up over calls until [`Renderer::reset`].
@@ -103,6 +107,11 @@ pub struct Renderer {
     begin: Option<u32>,
     /// The cloud is lit, and by the lights that there are.
     lit: bool,
+    /// Pixels have different numbers of samples.
+    adaptive: bool,
+    /// What [`Renderer::render_until`] found last.
+    outcome: Option<Outcome>,
+    pace: adaptive::Pace,
     /// Samples were submitted before, so the driver has compiled what it puts off until then.
     warm: bool,
     /// How often the sums of the band on the device are copied to the host, and when they last were.
@@ -123,7 +132,7 @@ impl Renderer {
     }
 
     /// As [`Renderer::new`], with buffers of the caller's in place of our own: geometry, results, or any slot but
-    /// `Progresses`, as [`Plan`] lists them. Elements are laid out as [`crate::shared`] says, without padding. What the
+    /// `Progresses` and `Actives`, as [`Plan`] lists them. Elements are laid out as [`crate::shared`] says, without padding. What the
     /// scene determines is written to them here: the BVH and the order of its triangles are made on the host. Vertices
     /// that only a buffer of the caller's holds are read back by him, once, for [`Scene::from_meshes`].
     ///
@@ -155,7 +164,7 @@ impl Renderer {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
         }
         let span = timeline::begin(&settings.timeline, "prepare");
-        let mut prepared = prepare(scene, settings)?;
+        let mut prepared = prepared(scene, settings)?;
         change(&mut prepared);
         drop(span);
         let limits = Limits::of(device);
@@ -184,7 +193,7 @@ impl Renderer {
             };
             let (_, buffer) = given.swap_remove(position);
             let problem = match slot {
-                Slot::Progresses => "must be the renderer's own".into(),
+                Slot::Progresses | Slot::Actives => "must be the renderer's own".into(),
                 _ if buffer.bytes() < bytes => format!("has {} bytes; {bytes} are needed", buffer.bytes()),
                 _ => return Ok(buffer),
             };
@@ -248,6 +257,9 @@ impl Renderer {
             strata: [None; BATCHES as usize],
             begin: None,
             lit: false,
+            adaptive: false,
+            outcome: None,
+            pace: Default::default(),
             warm: false,
             keep_every: None,
             kept_at: Instant::now(),
@@ -291,6 +303,7 @@ impl Renderer {
     /// Forgets every sample.
     pub fn reset(&mut self) {
         self.begin = None;
+        (self.adaptive, self.outcome) = (false, None);
         self.resident = self.settings.recording.then_some(0);
         self.set_count(Count { end: NO_SAMPLES, ..self.count().unwrap_or_default() });
         for band in &mut self.bands {
@@ -324,6 +337,9 @@ impl Renderer {
         if range.start >= range.end {
             return Err(Error::setting("samples", format!("{}:{} holds no sample", range.start, range.end)));
         }
+        if self.adaptive {
+            return Err(Error::setting("samples", "of the pixels differ in number: none can follow them all"));
+        }
         if self.begin.is_some() && self.samples().end != range.start {
             let problem = format!("{}:{} does not follow {:?}", range.start, range.end, self.samples());
             return Err(Error::setting("samples", problem));
@@ -333,7 +349,8 @@ impl Renderer {
             self.bands.iter_mut().for_each(|band| band.end = range.start);
         }
         let pixels: u64 = self.bands.iter().map(|band| u64::from(band.pixels)).sum();
-        let mut state = Progress { done: 0, total: pixels * u64::from(range.end - range.start) };
+        let total = pixels * u64::from(range.end - range.start);
+        let mut state = Progress { done: 0, total, error: None };
         let early = |band: &Band| u64::from(band.pixels) * u64::from(band.end.min(range.end) - range.start);
         state.done += self.bands.iter().map(early).sum::<u64>();
         self.light_cloud()?;
@@ -347,9 +364,13 @@ impl Renderer {
                     self.make_resident(band)?;
                 }
                 while next < pass.end && !(stop && pass.start > range.start) {
-                    let count = (SUBMISSION / u64::from(self.bands[band].pixels)).clamp(1, u64::from(PASS)) as u32;
+                    let pixels = self.bands[band].pixels;
+                    let Some(count) = self.pace.samples(pixels).or((pass.start == range.start).then_some(1)) else {
+                        stop = true;
+                        break;
+                    };
                     let end = pass.end.min(next.saturating_add(count));
-                    self.submit_samples(band, next..end).inspect_err(|_| self.distrust(band))?;
+                    self.submit_samples(band, next..end, None).inspect_err(|_| self.distrust(band))?;
                     self.keep_in_time()?;
                     state.done += u64::from(self.bands[band].pixels) * u64::from(end - next);
                     next = end;
@@ -366,32 +387,53 @@ impl Renderer {
         Ok(self.samples().end == range.end)
     }
 
-    fn submit_samples(&mut self, band: usize, samples: Range<u32>) -> Result<()> {
+    /// Adds samples to a band: to all of its pixels, or to so many that Actives lists.
+    fn submit_samples(&mut self, band: usize, samples: Range<u32>, listed: Option<u32>) -> Result<()> {
+        let start = Instant::now();
         let Renderer { kernels, bindings, prepared, strata, bands, .. } = self;
         let recorder = own(&mut self.recorder)?;
         recorder.begin()?;
-        let mut dispatch = |kernel: &Kernel, invocations: u32, step: &Step| {
-            recorder.dispatch(kernel, bindings, invocations, step);
-        };
         let Band { first_row, pixels, .. } = bands[band];
+        let traced = listed.unwrap_or(0);
         if let Some(count) = count(&self.buffers) {
             let range = samples.start.wrapping_sub(count.first)..samples.end.wrapping_sub(count.first);
-            kernels.recording(prepared, &bands[band], range, &mut dispatch);
+            kernels.recording(prepared, &bands[band], range, &mut |kernel, invocations, step| {
+                recorder.dispatch(kernel, bindings, invocations, step);
+            });
         } else {
+            let actives = find(&self.buffers, Slot::Actives).expect("kernels work on lists");
+            let base = Step { first_row, pixel_count: pixels, traced, ..Step::default() };
+            let whole = Extent::Invocations(listed.unwrap_or(pixels));
             for sample_index in samples.clone() {
-                let point = random::point(sample_index);
-                let step = Step { first_row, pixel_count: pixels, sample_index, point, ..Step::default() };
+                let step = Step { sample_index, point: random::point(sample_index), ..base };
                 let stratum = Some(random::stratum(&prepared.features, sample_index));
-                let resident = &mut strata[random::batch(sample_index) as usize];
-                kernels.sample(prepared, step, *resident != stratum, &mut dispatch);
+                let batch = random::batch(sample_index);
+                let resident = &mut strata[batch as usize];
+                // No pixel of the batch is known to see anything: no workgroups, but one in the other directions.
+                let arguments = u64::from(16 * batch);
+                if *resident != stratum {
+                    recorder.update(actives, arguments, &[0, 1, 1, 0]);
+                }
+                kernels.sample(prepared, step, *resident != stratum, &mut |kernel, all, step| {
+                    let extent = if all { whole } else { Extent::Indirect(actives, arguments) };
+                    recorder.dispatch_extent(kernel, bindings, extent, step);
+                });
                 *resident = stratum;
             }
+            let step = Step { count: samples.end - samples.start, ..base };
+            kernels.count.iter().for_each(|kernel| recorder.dispatch_extent(kernel, bindings, whole, &step));
         }
         recorder.submit_and_wait()?;
-        bands[band].end = samples.end;
+        bands[band].changed = true;
+        // Of listed pixels others are behind.
+        if listed.is_none() {
+            bands[band].end = samples.end;
+        }
+        let worked = listed.unwrap_or(pixels);
+        self.pace.note(start, u64::from(worked) * samples.len() as u64);
         let name = if self.warm { "submission" } else { "first dispatch" };
         self.warm = true;
-        self.note(name, Work { band: band as u32, pixels, samples });
+        self.note(name, Work { band: band as u32, pixels: worked, samples });
         Ok(())
     }
 
@@ -427,24 +469,23 @@ impl Renderer {
 }
 
 impl Kernels {
-    /// The dispatches of one sample of a band, in order: kernel, invocations, constants. `primary` is among them unless
-    /// the G-buffer of the sample's batch holds.
+    /// The dispatches of one sample of a band, in order: kernel, whether it works on pixels that see nothing too,
+    /// constants. `primary` is among them unless the G-buffer of the sample's batch holds.
     fn sample(
         &self,
         prepared: &Prepared,
         mut step: Step,
         primary: bool,
-        dispatch: &mut dyn FnMut(&Kernel, u32, &Step),
+        dispatch: &mut dyn FnMut(&Kernel, bool, &Step),
     ) {
-        let pixels = step.pixel_count;
         (step.first, step.count) = (1, 1);
+        if primary {
+            self.primary.iter().for_each(|kernel| dispatch(kernel, true, &step));
+        }
         let mut dispatch = |kernel: &Option<Kernel>, step: &Step| {
-            kernel.iter().for_each(|kernel| dispatch(kernel, pixels, step));
+            kernel.iter().for_each(|kernel| dispatch(kernel, false, step));
             kernel.is_some()
         };
-        if primary {
-            dispatch(&self.primary, &step);
-        }
         // By parts, so that no invocation loops without end.
         let parts = prepared.view.leaves.div_ceil(GATHER_POINTS);
         for part in 0..parts {
@@ -474,6 +515,17 @@ impl Kernels {
             dispatch(&self.single, &step);
         }
     }
+}
+
+/// What kernels read, and which of their features a renderer uses.
+fn prepared(scene: &Scene, settings: &Settings) -> Result<Prepared> {
+    let mut prepared = prepare(scene, settings)?;
+    let features = &mut prepared.features;
+    features.listed = u32::from(!settings.recording);
+    if settings.estimate_error && prepared.has_reflection {
+        features.batches = 2;
+    }
+    Ok(prepared)
 }
 
 /// The recorder of a device with a queue.

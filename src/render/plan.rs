@@ -4,7 +4,7 @@ use super::{bands, budget};
 use crate::{
     error::Result,
     gpu::Device,
-    prepare::{Prepared, prepare},
+    prepare::Prepared,
     scene::Scene,
     settings::{Model, Settings},
     shared::{self, BOUNDARY_ROW, MAX_RECORDED, MODEL_LAMBERT, Slot, TABLE_NODES},
@@ -81,7 +81,7 @@ impl Plan {
     /// # Errors
     /// As [`Renderer::new`](super::Renderer::new), but for what only a device can tell.
     pub fn new(scene: &Scene, settings: &Settings, limits: Limits) -> Result<Plan> {
-        let prepared = prepare(scene, settings)?;
+        let prepared = super::prepared(scene, settings)?;
         let bands = bands::split(limits, &prepared, settings)?;
         budget::check(limits, scene, &prepared, &bands)?;
         let bands: Vec<u32> = bands.iter().map(|band| band.pixels).collect();
@@ -116,10 +116,11 @@ impl Plan {
 pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
     match stem {
         "primary" => (true, "finds the surface that each pixel sees"),
-        "begin" | "clear" => match prepared.features.recorded != 0 {
+        "begin" => match prepared.features.recorded != 0 {
             true => (true, "recordings keep count of their samples on the device"),
             false => (false, "nothing is recorded into a caller's command buffer"),
         },
+        "count" => (true, "counts the samples of each pixel"),
         "resolve" => (true, "makes means and variances of the sums"),
         "irradiance" | "cluster" | "gather" => match prepared.clusters.is_empty() {
             false => (true, "light is gathered from a cloud of points"),
@@ -171,7 +172,6 @@ pub(super) fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
         (Slot::Materials, bytemuck::cast_slice(&prepared.materials)),
         (Slot::Lights, bytemuck::cast_slice(&prepared.lights)),
         (Slot::Emitters, bytemuck::cast_slice(&prepared.emitters)),
-        (Slot::EmitterCdf, bytemuck::cast_slice(&prepared.emitter_cdf)),
         (Slot::Boundaries, bytemuck::cast_slice(&prepared.boundaries)),
         (Slot::Environment, bytemuck::cast_slice(&prepared.environment)),
         (Slot::EnvironmentCdf, bytemuck::cast_slice(&prepared.environment_cdf)),
@@ -192,8 +192,7 @@ pub(super) fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
 pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slot, u64)> {
     let of_scene = scene_data(scene, prepared).into_iter();
     let of_scene = of_scene.map(|(slot, data)| (slot, room(prepared, slot).max(data.len() as u64)));
-    let of_band =
-        bands::slots(prepared).into_iter().map(|slot| (slot, bands::bytes_per_pixel(slot) * u64::from(pixels)));
+    let of_band = bands::slots(prepared).into_iter().map(|slot| (slot, bands::bytes(slot, &prepared.features, pixels)));
     let counters = (prepared.features.counters != 0).then_some((Slot::Counters, 4));
     let recorded = [(Slot::Progresses, 1), (Slot::Samples, MAX_RECORDED)];
     let recorded = recorded.into_iter().filter(|_| prepared.features.recorded != 0);
@@ -226,7 +225,7 @@ fn absent(slot: Slot) -> String {
     let lacks = match slot {
         Slot::Lights => "no delta light",
         Slot::Environment | Slot::EnvironmentCdf => "no image as environment",
-        Slot::Emitters | Slot::EmitterCdf => "no triangle emits light",
+        Slot::Emitters => "no triangle emits light",
         Slot::Texels | Slot::Textures | Slot::Coordinates => "no texture",
         Slot::Profiles => "no material has the table model",
         Slot::Thickness | Slot::Balances => "no profile depends on the curvature",
@@ -236,6 +235,7 @@ fn absent(slot: Slot) -> String {
         Slot::Gathers => "one dispatch gathers all light, or none is gathered",
         Slot::BatchSums => "no variance is asked for",
         Slot::Progresses | Slot::Samples | Slot::Colors => "nothing is recorded into a caller's command buffer",
+        Slot::Actives => "recordings work on every pixel",
         Slot::Counters => "steps are counted in tests and benchmarks only",
         _ => "nothing in the scene needs it",
     };

@@ -4,7 +4,7 @@
 use super::{Band, Kernels, Renderer, count};
 use crate::{
     error::{Error, Result},
-    gpu::{Commands, Kernel, Timestamps},
+    gpu::{Commands, Extent, Kernel, Timestamps},
     prepare::Prepared,
     shared::{MAX_RECORDED, NO_SAMPLES, Pixel, Progress, Slot, Step},
 };
@@ -101,7 +101,7 @@ impl Renderer {
         commands.barrier();
         let mut next = times;
         self.dispatches(samples, &mut |kernel, invocations, step| {
-            commands.dispatch(kernel, &self.bindings, invocations, step, next);
+            commands.dispatch(kernel, &self.bindings, Extent::Invocations(invocations), step, next);
             next = next.map(|times| Timestamps { first: times.first + 2, ..times });
         });
         commands.host_barrier();
@@ -212,11 +212,12 @@ impl Kernels {
         let count = samples.end.wrapping_sub(samples.start);
         let base = Step { first_row: band.first_row, pixel_count: band.pixels, ..Step::default() };
         let begin = Step { sample_index: samples.start, pixel_count: count, ..base };
-        for (kernel, step) in [(&self.begin, begin), (&self.clear, base)] {
+        for (kernel, step) in [(&self.begin, begin), (&self.count, Step { count, ..base })] {
             kernel.iter().for_each(|kernel| dispatch(kernel, step.pixel_count, &step));
         }
         for position in 0..count {
-            self.sample(prepared, Step { sample_index: position, ..base }, true, dispatch);
+            let mut all = |kernel: &Kernel, _, step: &Step| dispatch(kernel, band.pixels, step);
+            self.sample(prepared, Step { sample_index: position, ..base }, true, &mut all);
         }
         self.resolve.iter().for_each(|kernel| dispatch(kernel, band.pixels, &base));
     }

@@ -53,18 +53,18 @@ impl Renderer {
     /// Copies the sums of the band on the device to the host.
     fn keep(&mut self) -> Result<()> {
         let Some(band) = self.resident else { return Ok(()) };
-        let Band { pixels, end, sums, kept, .. } = &mut self.bands[band];
-        if *kept == Some(*end) {
+        let Band { pixels, end, sums, kept, changed, .. } = &mut self.bands[band];
+        if !*changed && kept.is_some() {
             return Ok(());
         }
         for (data, slot) in self.spare.iter_mut().zip(SUMS) {
             let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
-            data.resize((bands::bytes_per_pixel(slot) * u64::from(*pixels)) as usize, 0);
+            data.resize(bands::bytes(slot, &self.prepared.features, *pixels) as usize, 0);
             download_to(&self.device, buffer, data)?;
         }
         // Half new and half old they would be of no use.
         std::mem::swap(sums, &mut self.spare);
-        *kept = Some(*end);
+        (*kept, *changed) = (Some(*end), false);
         self.kept_at = Instant::now();
         Ok(())
     }

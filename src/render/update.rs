@@ -58,6 +58,8 @@ impl Renderer {
         let before = Before { prepared: &self.prepared, authored: &self.authored };
         let mut new = prepare_again(scene, &self.settings, Some(before))?;
         new.features.counters = self.prepared.features.counters;
+        new.features.listed = self.prepared.features.listed;
+        new.features.batches = self.prepared.features.batches;
         self.check_fit(&new)?;
 
         self.reset();

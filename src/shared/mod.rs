@@ -60,6 +60,8 @@ constants! {
     SEVERAL: u32 = 0xffffffffu32;
     /// Most levels of the BVH, and so entries of a traversal's stack; the host refuses deeper trees.
     BVH_DEPTH: u32 = 24;
+    /// Words before the lists of Actives: four for each batch.
+    ACTIVE_HEADER: u32 = 32;
     /// Value of `Surface::triangle` for a ray that hits nothing.
     MISS: u32 = 0xffffffffu32;
 
@@ -338,11 +340,16 @@ structs! {
         first: u32,
         /// 1 in the sample's last dispatch of `gather`.
         last: u32,
-        /// 1 in the sample's first dispatch of all that add to the sums: it counts the sample.
+        /// 1 in the sample's first dispatch of all that add to the sums: it counts whether the pixel is covered. Of `count`,
+        /// the samples that it adds.
         count: u32,
-        /// First sample of the whole range that is in the sums, for `resolve`; of those that light the cloud.
+        /// Pixels that `primary` and `count` take from the list of those to trace; 0 for all of the band.
+        traced: u32,
+        /// 1 for the variance of all light from `resolve`, 0 for that of subsurface light.
+        all_light: u32,
+        /// First sample in the sums, for `resolve`; of those that light the cloud.
         range_begin: u32,
-        /// End of that range.
+        /// End of those that light the cloud.
         range_end: u32,
         /// Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from.
         node: u32,
@@ -573,6 +580,8 @@ structs! {
         triangle: u32,
         /// Probability that a point is drawn on it, over its area.
         density: f32,
+        /// Probability of those before it, and with its own; multiples of 2^-24.
+        cumulative: [f32; 2],
     }
 
     /// The surface a camera ray meets first (the G-buffer), written by `primary`.
@@ -658,7 +667,7 @@ buffers! {
     HitLists = 10: HIT_LISTS [Hits] hit_lists;
     /// One per pixel of the band.
     RunningSums = 11: RUNNING_SUMS [Sums] running_sums;
-    /// Subsurface sum of each batch: batch * pixel_count + pixel.
+    /// Subsurface sum of each batch: batch * pixel_count + pixel. Then, where they are kept, those of reflected light.
     BatchSums = 12: BATCH_SUMS [Vec3] batch_sums;
     /// The finished band.
     Pixels = 13: PIXELS [Pixel] pixels;
@@ -666,8 +675,9 @@ buffers! {
     Counters = 14: COUNTERS [u32] counters;
     /// Emissive triangles, by rising index.
     Emitters = 15: EMITTERS [Emitter] emitters;
-    /// Cumulative probability of the emitters, emitter_count + 1 multiples of 2^-24 from 0 to 1.
-    EmitterCdf = 16: EMITTER_CDF [f32] emitter_cdf;
+    /// Of each batch the arguments of an indirect dispatch (three words) and how many pixels see something; then the pixels
+    /// to trace, then of each batch those that see something, pixel_count at most.
+    Actives = 16: ACTIVES [u32] actives;
     /// 256 numbers, the decoding of sRGB bytes; then the texels of all textures, red in the lowest byte, alpha in the highest.
     Texels = 17: TEXELS [u32] texels;
     /// TEXTURE_KINDS entries for each material.
@@ -701,7 +711,7 @@ features! {
     projection = 1: PROJECTION,
     /// One of ENVIRONMENT_*.
     environment = 2: ENVIRONMENT_KIND,
-    /// 1 where sums are kept by batch, for the variance.
+    /// 1 where sums of subsurface light are kept by batch, for the variance; 2 where also those of reflected light are.
     batches = 3: BATCHED,
     /// 1 to count traversal steps (tests and benchmarks).
     counters = 4: COUNT_STEPS,
@@ -713,6 +723,8 @@ features! {
     textures = 7: TEXTURED,
     /// Bit 1 << MODEL_X for each model X of the translucent materials that the scene shows.
     models = 5: MODELS,
+    /// 1 where kernels work on lists of pixels, without those that see nothing.
+    listed = 8: LISTED,
     /// 1 where profiles depend on the curvature of the surface that is seen.
     curvature = 10: CURVATURE,
     /// 1 where a caller's recordings keep count of the samples on the device.

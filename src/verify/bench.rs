@@ -26,6 +26,7 @@ const EVERYTHING: Features = Features {
     models: (1 << (MODEL_LAMBERT + 1)) - 1,
     curvature: 1,
     recorded: 0,
+    listed: 0,
     mixtures: 0,
     integrator: INTEGRATOR_SAMPLE,
 };
@@ -96,7 +97,7 @@ impl Bench {
     /// # Errors
     /// [`Error::Vulkan`], [`Error::Memory`].
     pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Result<Loaded> {
-        let fixed: [(Slot, &[u8]); 19] = [
+        let fixed: [(Slot, &[u8]); 18] = [
             (Slot::Views, bytemuck::bytes_of(inputs.view)),
             (Slot::Nodes, bytemuck::cast_slice(nodes)),
             (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
@@ -104,7 +105,6 @@ impl Bench {
             (Slot::Materials, bytemuck::cast_slice(inputs.materials)),
             (Slot::Lights, bytemuck::cast_slice(inputs.lights)),
             (Slot::Emitters, bytemuck::cast_slice(inputs.emitters)),
-            (Slot::EmitterCdf, bytemuck::cast_slice(inputs.emitter_cdf)),
             (Slot::Boundaries, bytemuck::cast_slice(inputs.boundaries)),
             (Slot::Environment, bytemuck::cast_slice(inputs.environment)),
             (Slot::EnvironmentCdf, bytemuck::cast_slice(inputs.environment_cdf)),

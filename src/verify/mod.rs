@@ -162,14 +162,14 @@ tests! {
     "traversal.all" ["functions"] geometry::all;
     "sums.add" ["functions"] geometry::add;
     "kernel.begin" ["begin"] stages::begin;
-    "kernel.clear" ["clear"] stages::clear;
+    "kernel.count" ["count"] stages::count;
     "kernel.irradiance" ["irradiance"] cloud::irradiance;
     "kernel.cluster" ["cluster"] cloud::cluster;
-    "kernel.gather" ["gather"] cloud::gather;
     "kernel.primary" ["primary"] |context| stages::each(context, stages::primary);
     "kernel.sample" ["sample"] |context| stages::each(context, stages::sample);
     "kernel.reproject" ["reproject"] |context| stages::each(context, stages::reproject);
     "kernel.accumulate" ["accumulate"] |context| stages::each(context, stages::accumulate);
+    "kernel.gather" ["gather"] cloud::gather;
     "kernel.single" ["single"] |context| stages::each(context, stages::single);
     "kernel.reflect" ["reflect"] |context| stages::each(context, stages::reflect);
     "kernel.resolve" ["resolve"] stages::resolve;

@@ -4,7 +4,7 @@ use super::{Bound, Case, Context, Loaded, ROUNDING, Roundings, Verdict, World, r
 use crate::{
     error::Result,
     reference::{
-        self, accumulate::accumulate as twin_accumulate, begin::begin as twin_begin, clear::clear as twin_clear,
+        self, accumulate::accumulate as twin_accumulate, begin::begin as twin_begin, count::count as twin_count,
         primary::primary as twin_primary, random, reflect::reflect as twin_reflect,
         reproject::reproject as twin_reproject, resolve::resolve as twin_resolve, sample::sample as twin_sample,
         single::single as twin_single, strict, sums::Contribution,
@@ -254,7 +254,7 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
             let at = || format!("{name}, pixel {i}");
             let covered = u32::from(staged.surfaces[i].triangle != MISS);
             let counts = (sums.samples, sums.covered, sums.invalid);
-            verdict.require(counts == (1, covered, u32::from(twin.invalid)), || format!("{}: {counts:?}", at()));
+            verdict.require(counts == (0, covered, u32::from(twin.invalid)), || format!("{}: {counts:?}", at()));
             verdict.require(batch[i] == sums.subsurface, || format!("{}: the batch's sum is another", at()));
             if twin.radiance != DVec3::ZERO || sums.subsurface != Vec3::ZERO {
                 lit += 1;
@@ -420,13 +420,14 @@ pub fn begin(context: &mut Context) -> Result<Verdict> {
     Ok(verdict)
 }
 
-/// Sums where a recording starts anew, and where it does not.
+/// Samples and sums where a recording starts anew, and where it does not.
 ///
 /// # Errors
 /// As [`super::Test::run`].
-pub fn clear(context: &mut Context) -> Result<Verdict> {
+pub fn count(context: &mut Context) -> Result<Verdict> {
     const PIXELS: u32 = 150;
-    let world = World::new(Material::default(), PROJECTION_MIS, 1);
+    let mut world = World::new(Material::default(), PROJECTION_MIS, 1);
+    world.features.recorded = 1;
     let number = |i: u32| random::unit(random::hash(i)) as f32 + 1.0;
     let sums: Vec<Sums> = (0..PIXELS)
         .map(|i| Sums {
@@ -448,12 +449,12 @@ pub fn clear(context: &mut Context) -> Result<Verdict> {
             (Slot::RunningSums, bytemuck::cast_slice(&sums)),
             (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
         ];
-        let step = Step { pixel_count: PIXELS, ..Step::default() };
-        let loaded = context.bench.run("clear", &world.inputs(), &[], &step, &buffers)?;
+        let step = Step { pixel_count: PIXELS, count: 5, ..Step::default() };
+        let loaded = context.bench.run("count", &world.inputs(), &[], &step, &buffers)?;
         let (mut sums, mut batch_sums) = (sums.clone(), batch_sums.clone());
         for (i, sums) in sums.iter_mut().enumerate() {
             let mut mine: Vec<Vec3> = (0..BATCHES as usize).map(|b| batch_sums[b * PIXELS as usize + i]).collect();
-            twin_clear(&progress[0], sums, &mut mine);
+            twin_count(&step, &progress[0], sums, &mut mine);
             (0..BATCHES as usize).for_each(|b| batch_sums[b * PIXELS as usize + i] = mine[b]);
         }
         let found: Vec<u32> = context.bench.read(&loaded, Slot::RunningSums)?;

@@ -400,7 +400,7 @@ fn shining(count: u32) -> World {
         let emission = Vec3::new(1.0, 0.5, 0.2) * (k % 3) as f32;
         world.materials.push(Material { emission, flags: TWO_SIDED, ..Material::default() });
     }
-    (world.emitters, world.emitter_cdf) = emitter::table(&world.triangles, &world.shadings, &world.materials);
+    world.emitters = emitter::table(&world.triangles, &world.shadings, &world.materials);
     world.view.emitter_count = world.emitters.len() as u32;
     world.features.emitters = 1;
     // The vectors of the invocations follow; triangles have no need of normals here.

@@ -199,7 +199,7 @@ fn times_of_every_dispatch_are_at_their_slots() {
     let device = app.open();
     let renderer = Renderer::new(&device, &scene(), &settings()).expect("a renderer");
     let names = renderer.timestamp_layout(4..6).expect("it records");
-    assert_eq!(names[..3], ["begin", "clear", "primary"]);
+    assert_eq!(names[..3], ["begin", "count", "primary"]);
     assert_eq!(names.last(), Some(&"resolve"));
     assert_eq!(names.iter().filter(|name| **name == "sample").count(), 2);
     const FIRST: u32 = 3;

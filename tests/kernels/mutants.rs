@@ -16,3 +16,10 @@ fn some_planted_faults_are_named() {
         plantation.check(&mut bench, mutant).expect("the fault is named");
     }
 }
+
+#[test]
+fn every_fault_has_its_place() {
+    let plantation = plant::Plantation::new();
+    let lost: Vec<_> = table::MUTANTS.iter().filter(|mutant| !plantation.has_place(mutant)).map(|m| m.text).collect();
+    assert!(lost.is_empty(), "stands in its file no longer: {lost:#?}");
+}

@@ -11,7 +11,7 @@ fn functions_and_recordings_pass() {
     context.fraction = 4;
     let mut failed = vec![];
     // The kernels of every render are tested in `stages`, images in another program.
-    let recording = |name: &str| ["kernel.begin", "kernel.clear"].contains(&name);
+    let recording = |name: &str| ["kernel.begin", "kernel.count"].contains(&name);
     let elsewhere = |name: &str| name.starts_with("image.") || name.starts_with("kernel.") && !recording(name);
     for test in TESTS.iter().filter(|test| !elsewhere(test.name)) {
         let start = std::time::Instant::now();

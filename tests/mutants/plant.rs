@@ -48,11 +48,15 @@ impl Plantation {
         compiled.unwrap_or_else(|error| panic!("{stem}: {error}")).as_binary_u8().to_vec()
     }
 
+    pub fn has_place(&self, mutant: &Mutant) -> bool {
+        self.sources[mutant.file].contains(mutant.text)
+    }
+
     /// The first test that fails where a fault is planted, with its verdict; none if all pass.
     pub fn first_failure(&mut self, bench: &mut Bench, mutant: &Mutant) -> Option<(&'static str, String)> {
         let Mutant { file, text, with, .. } = mutant;
+        assert!(self.has_place(mutant), "glsl/{file} has no longer: {text}");
         let source = &self.sources[*file];
-        assert!(source.contains(text), "glsl/{file} has no longer: {text}");
         let mut planted = self.sources.clone();
         planted.insert(file.to_string(), source.replacen(text, with, 1));
         // Whether each kernel has other bytes now; compiled when the first test of it comes.

@@ -88,7 +88,8 @@ mutants! {
     vec3 e =";
     "begin.comp", "lost factor", "kernel.begin": "sobol((start + position) / BATCHES, d)" => "sobol(start + position, d)";
     "begin.comp", "comparison", "kernel.begin": "progresses[0].end == start" => "progresses[0].end >= start";
-    "clear.comp", "index", "kernel.clear": "b < BATCHES; b++" => "b < BATCHES - 1u; b++";
+    "count.comp", "index", "kernel.count": "b < BATCHES * BATCHED; b++" => "b < BATCHES * BATCHED - 1u; b++";
+    "count.comp", "lost factor", "kernel.count": "samples += step_.count" => "samples += 1u";
     "primary.comp", "sign", "kernel.primary": "- ndc.y * view.up" => "+ ndc.y * view.up";
     "pixel.glsl", "index", "kernel.primary": "return batch * step_.pixel_count + index;" =>
         "return (batch + 1u) % BATCHES * step_.pixel_count + index;";
@@ -98,7 +99,7 @@ mutants! {
     "reproject.comp", "order", "kernel.reproject": "hit_t[j - 1] > t" => "hit_t[j - 1] < t";
     "reproject.comp", "swapped branch", "kernel.reproject":
         "PROJECTION == PROJECTION_CAMERA ? CLOSEST : ALL" => "PROJECTION == PROJECTION_CAMERA ? ALL : CLOSEST";
-    "accumulate.comp", "lost factor", "kernel.accumulate":
+    "arriving.glsl", "lost factor", "kernel.irradiance":
         "light = incoming.irradiance * max(dot(shading_n, direction), 0.0);" => "light = incoming.irradiance;";
     "accumulate.comp", "lost factor", "kernel.accumulate": "if (MIXED != 0) radiance *= m.exit;" => "";
     "sums.glsl", "swapped branch", "kernel.accumulate": "covered ? 1u : 0u" => "covered ? 0u : 1u";

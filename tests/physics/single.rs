@@ -179,9 +179,9 @@ fn an_emitter_is_a_light() {
             world.shadings[last].material = 1;
         }
         world.materials.push(Material { emission: Vec3::ONE, ..Default::default() });
-        let (emitters, cdf) = table(&world.triangles, &world.shadings, &world.materials);
+        let emitters = table(&world.triangles, &world.shadings, &world.materials);
         (world.view.emitter_count, world.features.emitters) = (emitters.len() as u32, 1);
-        (world.emitters, world.emitter_cdf) = (emitters, cdf);
+        world.emitters = emitters;
         // Over the emitter's area, as seen from the plane; the depth of the scattering is nothing beside the distance.
         world.materials[0].extinction *= 1e3;
         world.materials[0].scattering *= 1e3;

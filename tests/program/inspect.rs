@@ -31,7 +31,7 @@ fn inspect_says_what_a_scene_requires() {
     assert_eq!(json["deviceBytes"].as_u64(), Some(sum));
     // No model that is recommended for marble needs single scattering.
     let kernels = json["kernels"].as_array().expect("a list");
-    let unused = ["begin", "clear", "irradiance", "cluster", "gather", "single"];
+    let unused = ["begin", "irradiance", "cluster", "gather", "single"];
     let expected = |stem: &serde_json::Value| !unused.contains(&stem.as_str().expect("a stem"));
     assert!(kernels.iter().all(|kernel| (kernel["used"] == true) == expected(&kernel["kernel"])), "{kernels:?}");
     assert_eq!(folder.files(), [""; 0]);

@@ -1,0 +1,317 @@
+//! Renders that end when the image is good enough, or the time is up: how much each pixel still needs, and who gets it.
+//!
+//! # Error
+//! Of an image x with the converged image r, over P pixels and three channels c,
+//!
+//!   E^2 = relMSE = 1 / (3 P) sum (x - r)^2 / (r^2 + .01 m^2),   m = mean of r.
+//!
+//! Its estimate takes x for r in the denominator and the variance V of the mean between the batches for (x - r)^2: their
+//! expectation but for what x in the denominator changes.
+//!
+//! # Allocation
+//! A pixel with n samples, whose part of E^2 is e, has s = n e at one sample. For a sum of s / n that is E^2, the fewest
+//! samples in all are n = sqrt(s) sum(sqrt(s)) / E^2 (J. Neyman, J. R. Stat. Soc. 97 (1934)). A pixel's own e has seven
+//! degrees of freedom and would stop the lucky ones early, so s is the mean over [`WINDOW`] x [`WINDOW`] pixels; and
+//! every pixel gets at least [`FLOOR`] of the mean. What is left is a bias of second order: pixels that happen to look
+//! quiet together with their neighbours get fewer samples.
+
+use super::{PASS, Progress, Renderer, SUBMISSION, own};
+use crate::{
+    error::{Error, Result},
+    gpu::{download_to, upload},
+    settings::Integrator,
+    shared::{ACTIVE_HEADER, BATCHES, Pixel, Slot, Step},
+    timeline::{self, Work},
+};
+use bytemuck::Zeroable;
+use std::{
+    ops::{ControlFlow, Range},
+    time::Instant,
+};
+
+/// Width of the square of pixels that are taken for alike (pixels).
+const WINDOW: usize = 5;
+
+/// Least samples of a pixel, in parts of the mean.
+const FLOOR: f64 = 1.0 / 8.0;
+
+/// Plans aim at this part of the error, so that a second one is seldom needed.
+const AIM: f64 = 0.97;
+
+/// Most by which a plan multiplies the samples of a pixel: the next one knows more.
+const GROWTH: u32 = 4;
+
+/// When [`Renderer::render_until`] ends: with the first of these.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// Samples of each pixel, at least 1.
+    pub samples: u32,
+    /// Estimated error of the image, sqrt(relMSE), over 0. Pixels then have different numbers of samples.
+    pub error: Option<f64>,
+    /// No submission is made that would end later, as far as the one before tells; but each pixel has a sample.
+    pub deadline: Option<Instant>,
+}
+
+/// What ended a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    Samples,
+    Error,
+    Time,
+    /// The caller's `progress`.
+    Caller,
+}
+
+/// How a render ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    pub stop: Stop,
+    /// The estimated error, sqrt(relMSE), where one was asked for and each pixel has a sample of each batch.
+    pub error: Option<f64>,
+}
+
+/// How long a pixel sample takes, and until when there is time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pace {
+    deadline: Option<Instant>,
+    /// Seconds of a pixel sample in the last submission.
+    each: f64,
+}
+
+impl Pace {
+    pub fn note(&mut self, start: Instant, pixel_samples: u64) {
+        self.each = start.elapsed().as_secs_f64() / pixel_samples.max(1) as f64;
+    }
+
+    /// How many samples of `pixels` pixels the next submission takes; none where the time is up.
+    pub fn samples(&self, pixels: u32) -> Option<u32> {
+        let most = (SUBMISSION / u64::from(pixels.max(1))).clamp(1, u64::from(PASS)) as u32;
+        let Some(deadline) = self.deadline else { return Some(most) };
+        let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
+        let fit = left / (self.each * f64::from(pixels)).max(1e-12);
+        if left > 0.0 && fit >= 1.0 { Some(most.min(fit as u32)) } else { None }
+    }
+}
+
+/// What there is of an image, pixel by pixel in the order of the bands.
+struct Estimate {
+    /// Samples.
+    samples: Vec<u32>,
+    /// The part of the squared error that each pixel has.
+    parts: Vec<f64>,
+    error: f64,
+}
+
+impl Renderer {
+    /// Adds samples until the first of the goals is reached, and says which. The samples that there are count: it goes on
+    /// after an interruption, or with a renderer that was resumed. With an error as goal all begin at sample 0, pixels
+    /// get different numbers of samples ([`Renderer::samples`] are those that all have), and no other call adds samples
+    /// after that until [`Renderer::reset`]; the expectation of the image is the same (but see the module on what
+    /// adaptive sampling changes). `progress` as in [`Renderer::render_range`].
+    ///
+    /// # Errors
+    /// As [`Renderer::render_range`]; [`Error::Setting`] for a goal that is out of range, or an error as goal of a
+    /// renderer that was made without [`Settings::estimate_error`](crate::Settings::estimate_error), records, or
+    /// gathers from a cloud, whose error all samples share.
+    pub fn render_until(
+        &mut self,
+        goal: &Goal,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Outcome> {
+        if goal.samples == 0 {
+            return Err(Error::setting("samples", "0 hold no sample"));
+        }
+        if let Some(error) = goal.error {
+            let refusal = match () {
+                _ if !(error.is_finite() && error > 0.0) => format!("{error} is not a finite number above 0"),
+                _ if self.settings.integrator == Integrator::Cloud => {
+                    "cannot be estimated where light is gathered from a cloud: all samples share it".into()
+                }
+                _ if self.settings.recording => "is no goal of a renderer that records".into(),
+                _ if !self.settings.estimate_error => "needs `estimate_error` in the renderer's settings".into(),
+                _ if self.begin.unwrap_or(0) != 0 => "needs all samples from the first on".into(),
+                _ => String::new(),
+            };
+            if !refusal.is_empty() {
+                return Err(Error::setting("error", refusal));
+            }
+        }
+        self.pace.deadline = goal.deadline;
+        let result = match goal.error {
+            None => self.uniform(goal.samples, progress).map(|stop| Outcome { stop, error: None }),
+            Some(error) => self.adaptive(goal.samples, error, progress),
+        };
+        self.pace.deadline = None;
+        self.outcome = result.as_ref().ok().copied();
+        result
+    }
+
+    /// The same number of samples for each pixel.
+    fn uniform(&mut self, samples: u32, progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Stop> {
+        let mut called_off = false;
+        let finished = self.render_rest(0..samples, &mut |state| {
+            let flow = progress(state);
+            called_off |= flow.is_break();
+            flow
+        })?;
+        Ok(match () {
+            _ if finished => Stop::Samples,
+            _ if called_off => Stop::Caller,
+            _ => Stop::Time,
+        })
+    }
+
+    fn adaptive(
+        &mut self,
+        most: u32,
+        goal: f64,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Outcome> {
+        if !self.adaptive && self.samples().end < BATCHES.min(most) {
+            let stop = self.uniform(BATCHES.min(most), progress)?;
+            if self.samples().end < BATCHES {
+                return Ok(Outcome { stop, error: None });
+            }
+        }
+        let mut stopped = None;
+        loop {
+            let estimate = self.estimate()?;
+            let error = Some(estimate.error);
+            let targets = self.targets(&estimate, goal, most);
+            let done: u64 = estimate.samples.iter().map(|&n| u64::from(n)).sum();
+            let mut state = Progress { done, total: targets.iter().map(|&n| u64::from(n)).sum(), error };
+            let stop = match stopped {
+                _ if estimate.error <= goal => Some(Stop::Error),
+                Some(stop) => Some(stop),
+                None if state.done == state.total => Some(Stop::Samples),
+                None => progress(&state).is_break().then_some(Stop::Caller),
+            };
+            if let Some(stop) = stop {
+                return Ok(Outcome { stop, error });
+            }
+            self.adaptive = true;
+            stopped = self.fulfil(&estimate.samples, &targets, &mut state, progress)?;
+        }
+    }
+
+    /// Adds the samples that each pixel lacks, from the pixels with the fewest on. Says why it did not.
+    fn fulfil(
+        &mut self,
+        samples: &[u32],
+        targets: &[u32],
+        state: &mut Progress,
+        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Option<Stop>> {
+        let mut first = 0;
+        for band in 0..self.bands.len() {
+            let pixels = self.bands[band].pixels;
+            let of_band = first..first + pixels as usize;
+            first = of_band.end;
+            let (mut samples, targets) = (samples[of_band.clone()].to_vec(), &targets[of_band]);
+            loop {
+                // Of the pixels that lack some, those with the fewest; until the next have as many, or their stratum ends.
+                let lacking = || samples.iter().zip(targets).filter(|(n, target)| n < target);
+                let Some(start) = lacking().map(|(n, _)| *n).min() else { break };
+                let list: Vec<u32> =
+                    (0..pixels).filter(|&i| samples[i as usize] == start && targets[i as usize] > start).collect();
+                let ends = list.iter().map(|&i| targets[i as usize]);
+                let end = next_block(start).min(ends.min().unwrap_or(start));
+                self.make_resident(band)?;
+                self.upload_list(&list)?;
+                let mut next = start;
+                while next < end {
+                    let Some(count) = self.pace.samples(list.len() as u32) else { return Ok(Some(Stop::Time)) };
+                    let portion = next..end.min(next.saturating_add(count));
+                    let submitted = self.submit_samples(band, portion.clone(), Some(list.len() as u32));
+                    submitted.inspect_err(|_| self.distrust(band))?;
+                    self.keep_in_time()?;
+                    state.done += list.len() as u64 * portion.len() as u64;
+                    next = portion.end;
+                    if progress(state).is_break() {
+                        return Ok(Some(Stop::Caller));
+                    }
+                }
+                list.iter().for_each(|&i| samples[i as usize] = end);
+                self.bands[band].end = samples.iter().copied().min().unwrap_or(end);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Lists the pixels of the band on the device that get the next samples.
+    fn upload_list(&mut self, list: &[u32]) -> Result<()> {
+        let mut words = vec![0; ACTIVE_HEADER as usize];
+        words.extend(list);
+        self.strata.fill(None);
+        upload(&self.device, self.buffer(Slot::Actives).expect("kernels work on lists"), bytemuck::cast_slice(&words))
+    }
+
+    fn estimate(&mut self) -> Result<Estimate> {
+        let _span = timeline::begin(&self.settings.timeline, "estimate");
+        let mut all: Vec<Pixel> = Vec::new();
+        for band in 0..self.bands.len() {
+            self.make_resident(band)?;
+            let pixels = self.bands[band].pixels;
+            let step = Step { pixel_count: pixels, all_light: 1, ..Step::default() };
+            let Renderer { recorder, kernels, bindings, .. } = self;
+            let recorder = own(recorder)?;
+            recorder.begin()?;
+            kernels.resolve.iter().for_each(|kernel| recorder.dispatch(kernel, bindings, pixels, &step));
+            recorder.submit_and_wait()?;
+            self.note("resolve", Work { band: band as u32, pixels, ..Work::default() });
+            let start = all.len();
+            all.resize(start + pixels as usize, Pixel::zeroed());
+            let resolved = self.buffer(Slot::Pixels).expect("every renderer has them");
+            download_to(&self.device, resolved, bytemuck::cast_slice_mut(&mut all[start..]))?;
+        }
+        let light = |pixel: &Pixel| pixel.subsurface.as_dvec3() + pixel.reflection.as_dvec3();
+        let values = 3.0 * all.len() as f64;
+        let mean = all.iter().map(|pixel| light(pixel).element_sum()).sum::<f64>() / values;
+        let part = |pixel: &Pixel| {
+            let denominator = light(pixel).powf(2.0) + 0.01 * mean * mean;
+            // Without any light there is no error.
+            if mean > 0.0 { (pixel.variance.as_dvec3() / denominator).element_sum() / values } else { 0.0 }
+        };
+        let parts: Vec<f64> = all.iter().map(part).collect();
+        let error = parts.iter().sum::<f64>().sqrt();
+        Ok(Estimate { samples: all.iter().map(|pixel| pixel.samples).collect(), parts, error })
+    }
+
+    /// The samples that each pixel should have for the error `goal`, `most` at most.
+    fn targets(&self, estimate: &Estimate, goal: f64, most: u32) -> Vec<u32> {
+        let width = self.prepared.view.crop_width as usize;
+        let own: Vec<f64> = estimate.parts.iter().zip(&estimate.samples).map(|(e, &n)| e * f64::from(n)).collect();
+        let roots: Vec<f64> = smooth(&own, width).into_iter().map(f64::sqrt).collect();
+        let scale = roots.iter().sum::<f64>() / (goal * AIM).powi(2);
+        let floor = FLOOR * scale * roots.iter().sum::<f64>() / roots.len() as f64;
+        let target = |(root, &n): (&f64, &u32)| {
+            let wanted = (root * scale).max(floor).ceil().min(f64::from(u32::MAX)) as u32;
+            let wanted = wanted.min(n.saturating_mul(GROWTH)).min(most);
+            if wanted > n { next_block(wanted - 1).min(most) } else { n }
+        };
+        let targets: Vec<u32> = roots.iter().zip(&estimate.samples).map(target).collect();
+        if targets != estimate.samples {
+            return targets;
+        }
+        // The plan before was fulfilled, but luck was not with it.
+        estimate.samples.iter().map(|&n| next_block(n).min(most)).collect()
+    }
+}
+
+/// End of the samples that share their sub-pixel strata with sample `n`; the first of each batch are apart.
+fn next_block(n: u32) -> u32 {
+    if n < BATCHES { BATCHES } else { (n / PASS + 1).saturating_mul(PASS) }
+}
+
+/// Means over squares of pixels, as far as they are in the image.
+fn smooth(values: &[f64], width: usize) -> Vec<f64> {
+    let height = values.len() / width;
+    let reach = |at: usize, size: usize| at.saturating_sub(WINDOW / 2)..(at + WINDOW / 2 + 1).min(size);
+    let mean = |range: Range<usize>, value: &dyn Fn(usize) -> f64| {
+        let count = range.len() as f64;
+        range.map(value).sum::<f64>() / count
+    };
+    let across: Vec<f64> =
+        (0..values.len()).map(|i| mean(reach(i % width, width), &|x| values[i / width * width + x])).collect();
+    (0..values.len()).map(|i| mean(reach(i / width, height), &|y| across[y * width + i % width])).collect()
+}
