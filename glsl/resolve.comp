@@ -10,13 +10,6 @@ PROGRESSES(readonly);
 PIXELS(writeonly);
 COLORS(writeonly);
 
-// Sum of batch `b`.
-vec3 batch_sum(uint b, uint index) {
-    vec3 sum = batch_sums[b * step_.pixel_count + index];
-    if (BATCHED > 1 && step_.all_light != 0u) sum += batch_sums[(BATCHES + b) * step_.pixel_count + index];
-    return sum;
-}
-
 // Samples below `end` of batch `b`.
 uint samples_of_batch(uint b, uint end) {
     return (end + BATCHES - 1u - b) / BATCHES;
@@ -36,14 +29,14 @@ void main() {
     pixel.variance = vec3(0.0);
     if (BATCHED != 0) {
         vec3 mean = vec3(0.0);
-        for (uint b = 0; b < BATCHES; b++) mean += batch_sum(b, index) / n;
+        for (uint b = 0; b < BATCHES; b++) mean += batch_sums[b * step_.pixel_count + index] / n;
         // Relative to the largest deviation, whose square may exceed f32.
         vec3 largest = vec3(0.0);
         vec3 deviation[BATCHES];
         float n_b[BATCHES];
         for (uint b = 0; b < BATCHES; b++) {
             n_b[b] = float(samples_of_batch(b, end) - samples_of_batch(b, begin));
-            deviation[b] = batch_sum(b, index) / max(n_b[b], 1.0) - mean;
+            deviation[b] = batch_sums[b * step_.pixel_count + index] / max(n_b[b], 1.0) - mean;
             largest = max(largest, abs(deviation[b]));
         }
         vec3 scale = max(largest, vec3(1e-30));

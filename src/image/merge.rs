@@ -76,7 +76,7 @@ fn integer(image: &Image, name: &str) -> Option<i32> {
     }
 }
 
-/// The samples in a part, which must be at least one.
+/// The samples in a part, which must be at least one, and the same of all pixels.
 fn range(file: &Path, image: &Image) -> Result<Range<i32>> {
     let bound = |name: &str| {
         let missing = || Error::file(file, format!("has no attribute {name}: not a render of translucent"));
@@ -85,6 +85,9 @@ fn range(file: &Path, image: &Image) -> Result<Range<i32>> {
     let range = bound("translucent.sampleBegin")?..bound("translucent.sampleEnd")?;
     if range.is_empty() || range.start < 0 {
         return Err(Error::file(file, format!("holds samples {}:{}", range.start, range.end)));
+    }
+    if image.attributes.contains_key("translucent.adaptive") {
+        return Err(Error::file(file, "its pixels have different numbers of samples: parts need the same of all"));
     }
     let count = image.width as usize * image.height as usize;
     match image.channels.iter().find(|channel| channel.data.len() != count) {

@@ -1,10 +1,10 @@
 //! The forms in which values stand on the command line.
 
-use std::ops::Range;
+use std::{ops::Range, time::Duration};
 use translucent::{CameraChoice, scene::parse_unit};
 
 /// Most samples of a pixel: attributes of EXR files are 32-bit integers.
-const MAX_SAMPLES: u32 = i32::MAX as u32;
+pub const MAX_SAMPLES: u32 = i32::MAX as u32;
 
 /// What an environment is made from.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,14 +19,23 @@ pub fn resolution(text: &str) -> Result<(u32, u32), String> {
     parts.filter(|&(w, h)| w > 0 && h > 0).ok_or("it is WIDTHxHEIGHT, such as 1024x768".into())
 }
 
+/// Samples that are asked for.
+#[derive(Clone, Debug)]
+pub struct Samples {
+    pub range: Range<u32>,
+    /// They are a part of a larger render, to be merged.
+    pub part: bool,
+}
+
 /// `64`, or `64:128` for samples 64 to 127.
-pub fn samples(text: &str) -> Result<Range<u32>, String> {
+pub fn samples(text: &str) -> Result<Samples, String> {
     let range = match text.split_once(':') {
         None => text.parse().ok().map(|end| 0..end),
         Some((begin, end)) => begin.parse().ok().zip(end.parse().ok()).map(|(begin, end)| begin..end),
     };
     range
         .filter(|range| range.start < range.end && range.end <= MAX_SAMPLES)
+        .map(|range| Samples { range, part: text.contains(':') })
         .ok_or(format!("it is M or A:B, with 0 <= A < B <= {MAX_SAMPLES}"))
 }
 
@@ -73,6 +82,30 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
 /// A finite number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|value| *value > 0.0).ok_or("it is a finite number above 0".into())
+}
+
+/// `1%`, or the share `0.01`; above 0.
+pub fn share(text: &str) -> Result<f64, String> {
+    let value = match text.strip_suffix('%') {
+        Some(number) => positive(number.trim_end()).map(|number| number / 100.0),
+        None => positive(text),
+    };
+    value.map_err(|_| "it is a share above 0, such as 1% or 0.01".into())
+}
+
+/// `30s`, `500ms`, `2min`, `1h`, or a number of seconds; above 0.
+pub fn time(text: &str) -> Result<Duration, String> {
+    let split = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let seconds = match unit {
+        "" | "s" => 1.0,
+        "ms" => 1e-3,
+        "min" => 60.0,
+        "h" => 3600.0,
+        _ => f64::NAN,
+    };
+    let time = positive(number.trim_end()).ok().and_then(|n| Duration::try_from_secs_f64(n * seconds).ok());
+    time.filter(|time| !time.is_zero()).ok_or("it is a time above 0, such as 30s, 500ms, 2min or 1h".into())
 }
 
 /// `R,G,B`, or one number for all.

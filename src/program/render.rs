@@ -16,7 +16,7 @@ use std::{
     time::{Duration, Instant},
 };
 use translucent::{
-    Device, DeviceOptions, Error, Image, Renderer, Settings,
+    Device, DeviceOptions, Error, Goal, Image, Outcome, Progress, Renderer, Settings, Stop,
     gpu::leave,
     image::{Attribute, check_writable},
     settings::Integrator,
@@ -38,9 +38,16 @@ pub struct Render {
     #[arg(short, long, value_name = "OUT.exr")]
     output: Option<PathBuf>,
     /// Samples of each pixel, 64 or, of a cloud, 4; A:B renders samples A to B-1, a part that `merge` puts together with
-    /// others.
+    /// others. With --error or --time the most samples, without end if not given.
     #[arg(long, value_name = "M|A:B", value_parser = arguments::samples)]
-    samples: Option<Range<u32>>,
+    samples: Option<arguments::Samples>,
+    /// Stop when the estimated error of the image is below this: sqrt(relMSE), relMSE being the mean over pixels and RGB of
+    /// (x-r)^2 / (r^2 + .01 mean(r)^2) against the converged image r. Pixels get the samples that they need.
+    #[arg(long, value_name = "1%", value_parser = arguments::share)]
+    error: Option<f64>,
+    /// Stop when this time is used up, counted from the start of the program: 30s, 500ms, 2min, 1h.
+    #[arg(long, value_name = "30s", value_parser = arguments::time)]
+    time: Option<Duration>,
     /// How surfaces are found: rays traced through the scene.
     #[arg(long, default_value = "trace", value_parser = ["trace"])]
     reproject: String,
@@ -75,6 +82,8 @@ impl Render {
         if self.quiet {
             log::quiet();
         }
+        let begun = Instant::now();
+        self.check_goal()?;
         let output = self.output()?;
         let stop = stop_on_interrupt()?;
         let timeline = (!self.profile.is_empty() || cfg!(feature = "tracy")).then(Timeline::new);
@@ -96,18 +105,34 @@ impl Render {
             bar.suspend(|| self.warn(&format!("{why}; going on with a new device")));
             Device::open(&options)
         };
-        let (_, (finished, seconds, samples, mut image)) = renderer.with_recovery(&scene, reopen, |renderer| {
-            let finished = renderer.render_rest(self.samples(), &mut |progress| {
-                if bar.length() != Some(progress.total) {
-                    bar.set_length(progress.total);
+        let deadline = self.time.and_then(|time| begun.checked_add(time));
+        let (_, (outcome, seconds, mut image)) = renderer.with_recovery(&scene, reopen, |renderer| {
+            let mut progress = |progress: &Progress| {
+                let (done, total) = self.part_done(begun, progress);
+                bar.set_length(total);
+                bar.set_position(done);
+                if let Some(error) = progress.error {
+                    bar.set_message(format!("error {:.2} %  ", 100.0 * error));
                 }
-                bar.set_position(progress.done);
                 if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })?;
+            };
+            let samples = self.samples();
+            let outcome = if samples.start == 0 {
+                let goal = Goal { samples: samples.end, error: self.error, deadline };
+                renderer.render_until(&goal, &mut progress)?
+            } else {
+                let finished = renderer.render_rest(samples, &mut progress)?;
+                Outcome { stop: if finished { Stop::Samples } else { Stop::Caller }, error: None }
+            };
             bar.finish_and_clear();
-            let (seconds, samples) = (start.elapsed().as_secs_f64(), renderer.samples().len());
-            Ok((finished, seconds, samples, renderer.take_image()?))
+            let seconds = start.elapsed().as_secs_f64();
+            Ok((outcome, seconds, renderer.take_image()?))
         })?;
+        if let (Some(asked), Stop::Samples) = (self.error, outcome.stop) {
+            let reached = outcome.error.map_or("unknown".into(), |error| format!("{:.3} %", 100.0 * error));
+            self.warn(&format!("the error is {reached}, not {:.3} %, with all samples", 100.0 * asked));
+        }
+        let finished = outcome.stop != Stop::Caller;
         self.keep_asked(&mut image);
         if let Some(Attribute::Integer(invalid @ 1..)) = image.attributes.get("translucent.invalidSamples") {
             self.warn(&format!("samples left out because they were not finite or negative: {invalid}"));
@@ -119,10 +144,15 @@ impl Render {
         }
         drop(writing);
         let (width, height) = (image.width, image.height);
-        let rate = f64::from(width) * f64::from(height) * samples as f64 / seconds * 1e-6;
+        let samples = match image.attributes.get("translucent.samples") {
+            Some(Attribute::Integer(samples)) => *samples,
+            _ => 0,
+        };
+        let rate = f64::from(width) * f64::from(height) * f64::from(samples) / seconds * 1e-6;
+        let error = outcome.error.map_or(String::new(), |error| format!(", error {:.3} %", 100.0 * error));
         let note = if finished { "" } else { ", interrupted" };
         print(&format!(
-            "{}: {width}x{height}, {samples} samples, {seconds:.2} s, {rate:.3} Msamples/s{note}\n",
+            "{}: {width}x{height}, {samples} samples, {seconds:.2} s, {rate:.3} Msamples/s{error}{note}\n",
             output.display()
         ))?;
         if let Some(timeline) = timeline.as_ref().filter(|_| !self.profile.is_empty()) {
@@ -165,15 +195,41 @@ impl Render {
         Settings {
             seed: self.seed,
             variance: self.wants("variance") && self.samples().len() >= BATCHES as usize,
+            estimate_error: self.error.is_some(),
             ..self.scene.settings()
         }
     }
 
     fn samples(&self) -> Range<u32> {
-        self.samples.clone().unwrap_or(match self.scene.integrator {
-            Integrator::Sample => 0..64,
-            Integrator::Cloud => 0..4,
-        })
+        match (&self.samples, self.scene.integrator) {
+            (Some(samples), _) => samples.range.clone(),
+            _ if self.error.is_some() || self.time.is_some() => 0..arguments::MAX_SAMPLES,
+            (None, Integrator::Sample) => 0..64,
+            (None, Integrator::Cloud) => 0..4,
+        }
+    }
+
+    /// That the goal is one of a whole image.
+    fn check_goal(&self) -> Result<(), Failure> {
+        let part = self.samples.as_ref().is_some_and(|samples| samples.part);
+        let goals = [(self.error.is_some(), "--error"), (self.time.is_some(), "--time")];
+        match goals.iter().find(|(given, _)| *given && part) {
+            Some((_, goal)) => Err(Failure::input(format!("{goal} is not for a part of the samples (--samples A:B)"))),
+            None => Ok(()),
+        }
+    }
+
+    /// How far the render is, of how much: by whichever goal is nearer.
+    fn part_done(&self, begun: Instant, progress: &Progress) -> (u64, u64) {
+        const WHOLE: f64 = 1000.0;
+        let time = self.time.map(|time| begun.elapsed().as_secs_f64() / time.as_secs_f64());
+        // The squared error falls with the samples.
+        let error = self.error.and_then(|asked| Some((asked / progress.error?).powi(2)));
+        match [time, error].into_iter().flatten().reduce(f64::max) {
+            Some(part) => ((part.min(1.0) * WHOLE) as u64, WHOLE as u64),
+            None if self.error.is_some() => (0, WHOLE as u64),
+            None => (progress.done, progress.total),
+        }
     }
 
     fn wants(&self, layer: &str) -> bool {
@@ -192,17 +248,18 @@ impl Render {
             return ProgressBar::hidden();
         }
         let samples = self.samples().len();
+        let counted = self.error.is_none() && self.time.is_none();
         // Computed from the position, so that a line never shows two moments.
         let status = move |state: &ProgressState, out: &mut dyn fmt::Write| {
             let done = state.pos() as f64;
             let each = done / state.len().unwrap_or(1).max(1) as f64 * samples as f64;
             let rate = done / state.elapsed().as_secs_f64().max(1e-9) * 1e-6;
             // A line that cannot be drawn is no reason to stop.
-            let _ = write!(out, "{each:.0}/{samples} samples  {rate:.3} Msamples/s");
+            let _ = if counted { write!(out, "{each:.0}/{samples} samples  {rate:.3} Msamples/s") } else { Ok(()) };
         };
         // Draws to stderr, and nothing where that is no terminal. Without a length it would be drawn full.
         let bar = ProgressBar::new(1);
-        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {status}  {eta} left");
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}{status}  {eta} left");
         style.map_or(bar.clone(), |style| bar.with_style(style.with_key("status", status)))
     }
 }

@@ -17,7 +17,7 @@ pub fn batch_count(begin: u32, end: u32, batch: u32) -> u32 {
     before(end) - before(begin)
 }
 
-/// The pixel of its sums; `batch_sums` is empty or holds one sum per batch, of the light whose variance is asked for.
+/// The pixel of its sums; `batch_sums` is empty or holds one sum per batch.
 pub fn resolve(features: &Features, step: &Step, sums: &Sums, batch_sums: &[Vec3]) -> Pixel {
     let count = f64::from(sums.samples.max(1));
     let mean = |sum: Vec3, carry: Vec3| finite((sum.as_dvec3() + carry.as_dvec3()) / count);

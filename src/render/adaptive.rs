@@ -1,13 +1,5 @@
 //! Renders that end when the image is good enough, or the time is up: how much each pixel still needs, and who gets it.
 //!
-//! # Error
-//! Of an image x with the converged image r, over P pixels and three channels c,
-//!
-//!   E^2 = relMSE = 1 / (3 P) sum (x - r)^2 / (r^2 + .01 m^2),   m = mean of r.
-//!
-//! Its estimate takes x for r in the denominator and the variance V of the mean between the batches for (x - r)^2: their
-//! expectation but for what x in the denominator changes.
-//!
 //! # Allocation
 //! A pixel with n samples, whose part of E^2 is e, has s = n e at one sample. For a sum of s / n that is E^2, the fewest
 //! samples in all are n = sqrt(s) sum(sqrt(s)) / E^2 (J. Neyman, J. R. Stat. Soc. 97 (1934)). A pixel's own e has seven
@@ -15,15 +7,16 @@
 //! every pixel gets at least [`FLOOR`] of the mean. What is left is a bias of second order: pixels that happen to look
 //! quiet together with their neighbours get fewer samples.
 
-use super::{PASS, Progress, Renderer, SUBMISSION, own};
+use super::{PASS, Progress, Renderer, SUBMISSION, bands::Band, error};
 use crate::{
     error::{Error, Result},
-    gpu::{download_to, upload},
+    gpu::upload,
     settings::Integrator,
-    shared::{ACTIVE_HEADER, BATCHES, Pixel, Slot, Step},
-    timeline::{self, Work},
+    shared::{ACTIVE_HEADER, BATCHES, Slot, Sums},
+    timeline,
 };
-use bytemuck::Zeroable;
+use glam::Vec3;
+use rayon::prelude::*;
 use std::{
     ops::{ControlFlow, Range},
     time::Instant,
@@ -46,7 +39,7 @@ const GROWTH: u32 = 4;
 pub struct Goal {
     /// Samples of each pixel, at least 1.
     pub samples: u32,
-    /// Estimated error of the image, sqrt(relMSE), over 0. Pixels then have different numbers of samples.
+    /// Estimated error of the image, sqrt(relMSE), above 0. Each pixel gets 32 samples, then as many as it needs.
     pub error: Option<f64>,
     /// No submission is made that would end later, as far as the one before tells; but each pixel has a sample.
     pub deadline: Option<Instant>,
@@ -142,7 +135,8 @@ impl Renderer {
             Some(error) => self.adaptive(goal.samples, error, progress),
         };
         self.pace.deadline = None;
-        self.outcome = result.as_ref().ok().copied();
+        let asked = goal.error.is_some() || goal.deadline.is_some();
+        self.outcome = result.as_ref().ok().copied().filter(|_| asked);
         result
     }
 
@@ -167,13 +161,14 @@ impl Renderer {
         goal: f64,
         progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Outcome> {
-        if !self.adaptive && self.samples().end < BATCHES.min(most) {
-            let stop = self.uniform(BATCHES.min(most), progress)?;
+        let mut stopped = None;
+        if !self.adaptive && self.samples().end < PASS.min(most) {
+            let stop = self.uniform(PASS.min(most), progress)?;
             if self.samples().end < BATCHES {
                 return Ok(Outcome { stop, error: None });
             }
+            stopped = Some(stop).filter(|stop| *stop != Stop::Samples);
         }
-        let mut stopped = None;
         loop {
             let estimate = self.estimate()?;
             let error = Some(estimate.error);
@@ -215,7 +210,7 @@ impl Renderer {
                 let list: Vec<u32> =
                     (0..pixels).filter(|&i| samples[i as usize] == start && targets[i as usize] > start).collect();
                 let ends = list.iter().map(|&i| targets[i as usize]);
-                let end = next_block(start).min(ends.min().unwrap_or(start));
+                let end = next_stratum(start).min(ends.min().unwrap_or(start));
                 self.make_resident(band)?;
                 self.upload_list(&list)?;
                 let mut next = start;
@@ -248,33 +243,25 @@ impl Renderer {
 
     fn estimate(&mut self) -> Result<Estimate> {
         let _span = timeline::begin(&self.settings.timeline, "estimate");
-        let mut all: Vec<Pixel> = Vec::new();
-        for band in 0..self.bands.len() {
-            self.make_resident(band)?;
-            let pixels = self.bands[band].pixels;
-            let step = Step { pixel_count: pixels, all_light: 1, ..Step::default() };
-            let Renderer { recorder, kernels, bindings, .. } = self;
-            let recorder = own(recorder)?;
-            recorder.begin()?;
-            kernels.resolve.iter().for_each(|kernel| recorder.dispatch(kernel, bindings, pixels, &step));
-            recorder.submit_and_wait()?;
-            self.note("resolve", Work { band: band as u32, pixels, ..Work::default() });
-            let start = all.len();
-            all.resize(start + pixels as usize, Pixel::zeroed());
-            let resolved = self.buffer(Slot::Pixels).expect("every renderer has them");
-            download_to(&self.device, resolved, bytemuck::cast_slice_mut(&mut all[start..]))?;
-        }
-        let light = |pixel: &Pixel| pixel.subsurface.as_dvec3() + pixel.reflection.as_dvec3();
-        let values = 3.0 * all.len() as f64;
-        let mean = all.iter().map(|pixel| light(pixel).element_sum()).sum::<f64>() / values;
-        let part = |pixel: &Pixel| {
-            let denominator = light(pixel).powf(2.0) + 0.01 * mean * mean;
+        self.keep()?;
+        let band_sums = |band: &Band| -> Vec<Sums> { bytemuck::pod_collect_to_vec(&band.sums[0]) };
+        let sums: Vec<Vec<Sums>> = self.bands.iter().map(band_sums).collect();
+        let values = 3.0 * sums.iter().map(Vec::len).sum::<usize>() as f64;
+        let mean = sums.iter().flatten().map(|sums| error::light(sums).element_sum()).sum::<f64>() / values;
+        let k = 0.01 * mean * mean;
+        let (mut samples, mut parts) = (vec![], vec![]);
+        for (band, sums) in self.bands.iter().zip(&sums) {
+            let batches: Vec<Vec3> = bytemuck::pod_collect_to_vec(&band.sums[1]);
+            samples.extend(sums.iter().map(|sums| sums.samples));
             // Without any light there is no error.
-            if mean > 0.0 { (pixel.variance.as_dvec3() / denominator).element_sum() / values } else { 0.0 }
-        };
-        let parts: Vec<f64> = all.iter().map(part).collect();
+            let part = |(i, sums): (usize, &Sums)| match k > 0.0 {
+                true => error::part(sums.samples, &error::batches(&batches, band.pixels as usize, i), k) / values,
+                false => 0.0,
+            };
+            parts.par_extend(sums.par_iter().enumerate().map(part));
+        }
         let error = parts.iter().sum::<f64>().sqrt();
-        Ok(Estimate { samples: all.iter().map(|pixel| pixel.samples).collect(), parts, error })
+        Ok(Estimate { samples, parts, error })
     }
 
     /// The samples that each pixel should have for the error `goal`, `most` at most.
@@ -287,20 +274,20 @@ impl Renderer {
         let target = |(root, &n): (&f64, &u32)| {
             let wanted = (root * scale).max(floor).ceil().min(f64::from(u32::MAX)) as u32;
             let wanted = wanted.min(n.saturating_mul(GROWTH)).min(most);
-            if wanted > n { next_block(wanted - 1).min(most) } else { n }
+            if wanted > n { wanted.next_multiple_of(PASS).min(most) } else { n }
         };
         let targets: Vec<u32> = roots.iter().zip(&estimate.samples).map(target).collect();
         if targets != estimate.samples {
             return targets;
         }
         // The plan before was fulfilled, but luck was not with it.
-        estimate.samples.iter().map(|&n| next_block(n).min(most)).collect()
+        estimate.samples.iter().map(|&n| next_stratum(n).min(most)).collect()
     }
 }
 
-/// End of the samples that share their sub-pixel strata with sample `n`; the first of each batch are apart.
-fn next_block(n: u32) -> u32 {
-    if n < BATCHES { BATCHES } else { (n / PASS + 1).saturating_mul(PASS) }
+/// End of the samples that share their sub-pixel strata with sample `n`.
+fn next_stratum(n: u32) -> u32 {
+    (n / PASS + 1).saturating_mul(PASS)
 }
 
 /// Means over squares of pixels, as far as they are in the image.

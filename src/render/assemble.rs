@@ -11,7 +11,7 @@ use crate::{
     timeline::{self, Work},
 };
 use glam::{DVec3, Vec3};
-use std::{collections::BTreeMap, ops::Range};
+use std::collections::BTreeMap;
 
 /// What becomes of the sums when an image is made of them.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     let geometry =
         Geometry { triangles: whole(renderer, Slot::Triangles)?, shadings: whole(renderer, Slot::Shadings)? };
     let mut channels = Channels::new(count, has_variance);
-    let mut invalid = 0u64;
+    let (mut invalid, mut total, mut most) = (0u64, 0u64, 0);
     for band in 0..renderer.bands.len() {
         renderer.make_resident(band)?;
         let pixels = renderer.bands[band].pixels;
@@ -62,6 +62,8 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         drop(span);
         for (pixel, surface) in resolved.iter().zip(&surfaces) {
             invalid += u64::from(pixel.invalid);
+            total += u64::from(pixel.samples);
+            most = most.max(pixel.samples);
             channels.push(pixel, &centre(renderer, &geometry, surface));
         }
         if sums == Sums::Freed {
@@ -69,13 +71,18 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
             renderer.bands[band].free(range.start);
         }
     }
+    let counts = if renderer.adaptive {
+        Counts { begin: range.start, end: range.start + most, mean: (total as f64 / count as f64).round() as u32 }
+    } else {
+        Counts { begin: range.start, end: range.end, mean: range.end - range.start }
+    };
     Ok(Image {
         width: view.crop_width,
         height: rows.end - rows.start,
         origin: (view.crop_x, rows.start),
         full: (view.width, view.height),
         channels: channels.list,
-        attributes: attributes(renderer, range, invalid, has_variance),
+        attributes: attributes(renderer, &counts, invalid, has_variance),
     })
 }
 
@@ -227,13 +234,21 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
     })
 }
 
-fn attributes(renderer: &Renderer, range: Range<u32>, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
+/// Samples of an image.
+struct Counts {
+    begin: u32,
+    /// Of the pixel with the most.
+    end: u32,
+    mean: u32,
+}
+
+fn attributes(renderer: &Renderer, counts: &Counts, invalid: u64, has_variance: bool) -> BTreeMap<String, Attribute> {
     let settings = &renderer.settings;
     let info = renderer.device.info();
     let mut attributes: Vec<(&str, Attribute)> = vec![
-        ("samples", Attribute::Integer((range.end - range.start) as i32)),
-        ("sampleBegin", Attribute::Integer(range.start as i32)),
-        ("sampleEnd", Attribute::Integer(range.end as i32)),
+        ("samples", Attribute::Integer(counts.mean as i32)),
+        ("sampleBegin", Attribute::Integer(counts.begin as i32)),
+        ("sampleEnd", Attribute::Integer(counts.end as i32)),
         // EXR has no unsigned integers.
         ("seed", Attribute::Text(settings.seed.to_string())),
         ("version", Attribute::Text(env!("CARGO_PKG_VERSION").into())),
@@ -244,6 +259,13 @@ fn attributes(renderer: &Renderer, range: Range<u32>, invalid: u64, has_variance
         ("settings", Attribute::Text(described(renderer).to_string())),
         ("invalidSamples", Attribute::Integer(invalid.min(i32::MAX as u64) as i32)),
     ];
+    if let Some(outcome) = renderer.outcome {
+        attributes.push(("stop", Attribute::Text(format!("{:?}", outcome.stop).to_lowercase())));
+        attributes.extend(outcome.error.map(|error| ("error", Attribute::Float(error))));
+    }
+    if renderer.adaptive {
+        attributes.push(("adaptive", Attribute::Text("pixels have different numbers of samples: samples.Y".into())));
+    }
     if !has_variance {
         let why = format!("absent: fewer than {BATCHES} samples");
         attributes.push(("variance", Attribute::Text(why)));

@@ -5,6 +5,7 @@ mod assemble;
 mod bands;
 mod budget;
 mod cloud;
+mod error;
 mod plan;
 mod record;
 mod sums;

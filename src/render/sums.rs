@@ -51,7 +51,7 @@ impl Renderer {
     }
 
     /// Copies the sums of the band on the device to the host.
-    fn keep(&mut self) -> Result<()> {
+    pub(super) fn keep(&mut self) -> Result<()> {
         let Some(band) = self.resident else { return Ok(()) };
         let Band { pixels, end, sums, kept, changed, .. } = &mut self.bands[band];
         if !*changed && kept.is_some() {

@@ -345,8 +345,6 @@ structs! {
         count: u32,
         /// Pixels that `primary` and `count` take from the list of those to trace; 0 for all of the band.
         traced: u32,
-        /// 1 for the variance of all light from `resolve`, 0 for that of subsurface light.
-        all_light: u32,
         /// First sample in the sums, for `resolve`; of those that light the cloud.
         range_begin: u32,
         /// End of those that light the cloud.
