@@ -84,11 +84,12 @@
 //! | [`model`] | `scene`, `settings` | which profile a material gets |
 //! | [`curvature`] | `shared`, `reference` | the sphere that a body is locally like, and how much of its light the body gives back |
 //! | [`prepare`] | `scene`, `settings`, `shared`, `reference`, `model`, `curvature` | [`Scene`] and [`Settings`] to what kernels read |
-//! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging |
+//! | [`image`] | `error` | [`Image`]: channels, EXR, PNG, merging, differences |
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`measure`] | all of these | numeric experiments: kernels beside closed forms |
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
 //! | [`bench`] | all of these | fixed work, timed again and again, and compared |
+//! | [`tradeoff`] | all of these | one scene rendered in many ways, each with its time and its error |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //! | [`verify`] | all of these | tests of a driver: functions and kernels beside their twins |
 //!
@@ -121,6 +122,7 @@ pub mod settings;
 pub mod shared;
 pub mod table;
 pub mod timeline;
+pub mod tradeoff;
 pub mod verify;
 
 pub use ash;

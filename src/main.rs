@@ -3,7 +3,10 @@
 mod program;
 
 use clap::{Parser, Subcommand};
-use program::{bench::Bench, inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables, verify::Verify};
+use program::{
+    bench::Bench, inspect::Inspect, measure::Measure, merge::Merge, render::Render, tables, tradeoff::Tradeoff,
+    verify::Verify,
+};
 use std::process::ExitCode;
 
 /// Renders translucent matter (marble, skin, milk, wax) in glTF scenes with Vulkan compute.
@@ -28,6 +31,8 @@ enum Command {
     Measure(Box<Measure>),
     /// Time fixed work again and again, kernel by kernel, or say whether two such runs differ beyond noise.
     Bench(Box<Bench>),
+    /// Render a scene in many ways, and show time against error: CSV, plots and a page.
+    Tradeoff(Box<Tradeoff>),
     /// Put the parts of a larger render together, weighted by samples.
     Merge(Merge),
     /// Test a driver: every kernel and function against its twin.
@@ -45,6 +50,7 @@ fn main() -> ExitCode {
         Command::Inspect(inspect) => inspect.run(),
         Command::Measure(measure) => measure.run(),
         Command::Bench(bench) => bench.run(),
+        Command::Tradeoff(tradeoff) => tradeoff.run(),
         Command::Merge(merge) => merge.run(),
         Command::Verify(verify) => verify.run(),
         Command::Presets => tables::presets(),

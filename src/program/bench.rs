@@ -2,7 +2,7 @@
 
 use super::{
     Failure, arguments, print,
-    scene::SceneOptions,
+    scene::{Method, Subject},
     tables::{aligned, row, significant},
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,7 +21,9 @@ use translucent::{
 #[derive(clap::Args)]
 pub struct Bench {
     #[command(flatten)]
-    scene: Option<SceneOptions>,
+    scene: Option<Subject>,
+    #[command(flatten)]
+    method: Method,
     /// Samples of each pixel in a repeat.
     #[arg(long, value_name = "M", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
     samples: u32,
@@ -77,7 +79,7 @@ impl Bench {
         }
     }
 
-    fn measure(&self, options: &SceneOptions) -> Result<ExitCode, Failure> {
+    fn measure(&self, options: &Subject) -> Result<ExitCode, Failure> {
         if let Some(output) = &self.output {
             if !output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
                 return Err(Failure::input(format!("{}: its name must end in .json", output.display())));
@@ -99,7 +101,7 @@ impl Bench {
             eprintln!("warning: the device counts nothing: it lacks VK_KHR_performance_query, or counters of kernels");
         }
         drop(opening);
-        let settings = Settings { seed: self.seed, timeline, ..options.settings() };
+        let settings = Settings { seed: self.seed, timeline, ..self.method.settings(options.settings()) };
         let effort = Effort { samples: self.samples, warmup: self.warmup, repeat: self.repeat };
         let bar = self.bar();
         let report = bench::run(&device, &scene, &settings, effort, &mut |done| bar.set_position(u64::from(done)))?;

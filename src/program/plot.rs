@@ -29,9 +29,9 @@ const RADIUS: u32 = 4 * FINE;
 const STROKE: u32 = 2 * FINE;
 /// Deviations that are drawn [standard errors].
 const MOST: f64 = 5.0;
-const FONT: &str = "Helvetica, Arial, DejaVu Sans, sans-serif";
+pub const FONT: &str = "Helvetica, Arial, DejaVu Sans, sans-serif";
 /// M. Okabe, K. Ito, "Color Universal Design", 2008: colours that the colour-blind tell apart.
-const COLOURS: [RGBColor; 7] = [
+pub const COLOURS: [RGBColor; 7] = [
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(0, 114, 178),
@@ -41,10 +41,18 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-type Failed = Box<dyn std::error::Error>;
+pub type Failed = Box<dyn std::error::Error>;
+
+/// Gives plotters a typeface, by which it measures texts, and draws them where it draws pixels. SVG names [`FONT`], of
+/// which the reader takes what he has.
+pub fn register_font() -> Result<(), Failed> {
+    plotters::style::register_font(FONT, FontStyle::Normal, dejavu::sans::regular())
+        .map_err(|_| "the typeface is damaged".into())
+}
 
 /// The whole figure.
 pub fn svg(figure: &Figure) -> Result<String, Failed> {
+    register_font()?;
     let mut text = String::new();
     let panels = figure.panels.len() as u32;
     let lines = figure.panels.iter().map(|panel| legend(panel).len() as u32).max().unwrap_or(0);
@@ -239,7 +247,7 @@ where
 }
 
 /// A short number: powers of ten as such where they are far from 1.
-fn label(value: f64) -> String {
+pub fn label(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 || (1e-2..1e4).contains(&magnitude) {
         let text = format!("{value:.4}");

@@ -85,7 +85,7 @@ impl Render {
         let begun = Instant::now();
         self.check_goal()?;
         let output = self.output()?;
-        let stop = stop_on_interrupt()?;
+        let stop = stop_on_interrupt("what there is")?;
         let timeline = (!self.profile.is_empty() || cfg!(feature = "tracy")).then(Timeline::new);
         let (scene, warnings) = self.scene.load(timeline.clone()).map_err(Failure::while_reading)?;
         warnings.iter().for_each(|warning| self.warn(warning));
@@ -167,7 +167,7 @@ impl Render {
         let output = match &self.output {
             Some(output) => output.clone(),
             None => {
-                let file = &self.scene.file;
+                let file = &self.scene.subject.file;
                 let name = file.file_stem();
                 let name = name.ok_or_else(|| Failure::input(format!("{}: not a file", file.display())))?;
                 PathBuf::from(format!("{}.exr", name.to_string_lossy()))
@@ -201,7 +201,7 @@ impl Render {
     }
 
     fn samples(&self) -> Range<u32> {
-        match (&self.samples, self.scene.integrator) {
+        match (&self.samples, self.scene.method.integrator) {
             (Some(samples), _) => samples.range.clone(),
             _ if self.error.is_some() || self.time.is_some() => 0..arguments::MAX_SAMPLES,
             (None, Integrator::Sample) => 0..64,
@@ -264,15 +264,15 @@ impl Render {
     }
 }
 
-/// A flag that the first Ctrl-C sets; the second ends the program at once.
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+/// A flag that the first Ctrl-C sets, saying that `what` is written; the second ends the program at once.
+pub fn stop_on_interrupt(what: &'static str) -> Result<Arc<AtomicBool>, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
     ctrlc::set_handler(move || {
         if flag.swap(true, Ordering::Relaxed) {
             leave(1);
         }
-        eprintln!("interrupted: writing what there is (again to abort)");
+        eprintln!("interrupted: writing {what} (again to abort)");
     })
     .map_err(|error| Failure { message: format!("Ctrl-C cannot be handled: {error}"), code: ExitCode::from(1) })?;
     Ok(stop)

@@ -1,4 +1,4 @@
-//! What is rendered and how it is seen: the options that `render` and `inspect` share.
+//! What is rendered, how it is seen, and by which method: the options that commands share.
 
 use super::{Failure, arguments, arguments::EnvironmentSource, keep};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -13,6 +13,35 @@ use translucent::{
 
 #[derive(clap::Args)]
 pub struct SceneOptions {
+    #[command(flatten)]
+    pub subject: Subject,
+    #[command(flatten)]
+    pub method: Method,
+}
+
+/// What computes the light.
+#[derive(clap::Args)]
+pub struct Method {
+    /// Incoming directions of the environment at each sampled position.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    directions: u32,
+    /// What computes the light that comes out of matter: probes of each pixel (sample), or points on the surface that are lit
+    /// once and gathered from (cloud), which leaves no noise.
+    #[arg(long, default_value = "sample", value_parser = integrators())]
+    pub integrator: Integrator,
+    /// How a sampled point is carried to the surface: all techniques combined, the camera ray alone (biased), the
+    /// normal axis alone.
+    #[arg(long, default_value = "mis", value_parser = projections())]
+    projection: Projection,
+    /// How light spreads in every translucent material; auto is what the material says, else what `inspect`
+    /// recommends; lambert is the opaque limit, where light leaves where it entered.
+    #[arg(long, default_value = "auto", value_parser = models())]
+    model: Model,
+}
+
+/// Everything but the method, which `tradeoff` varies.
+#[derive(clap::Args)]
+pub struct Subject {
     /// The scene, a glTF 2.0 file.
     #[arg(value_name = "SCENE.gltf|.glb")]
     pub file: PathBuf,
@@ -22,13 +51,6 @@ pub struct SceneOptions {
     /// Camera by name or index; without it the first, or one that frames the scene.
     #[arg(long, value_name = "NAME|INDEX", value_parser = arguments::camera)]
     camera: Option<CameraChoice>,
-    /// Incoming directions of the environment at each sampled position.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    directions: u32,
-    /// What computes the light that comes out of matter: probes of each pixel (sample), or points on the surface that are lit
-    /// once and gathered from (cloud), which leaves no noise.
-    #[arg(long, default_value = "sample", value_parser = integrators())]
-    pub integrator: Integrator,
     /// Most points of the cloud.
     #[arg(long, value_name = "N", default_value_t = Cloud::default().points,
           value_parser = clap::value_parser!(u32).range(1..=Cloud::POINTS_MAX as i64))]
@@ -39,17 +61,9 @@ pub struct SceneOptions {
     /// Samples that light each point of the cloud.
     #[arg(long, value_name = "M", default_value_t = Cloud::default().samples, value_parser = clap::value_parser!(u32).range(1..))]
     cloud_samples: u32,
-    /// How a sampled point is carried to the surface: all techniques combined, the camera ray alone (biased), the
-    /// normal axis alone.
-    #[arg(long, default_value = "mis", value_parser = projections())]
-    projection: Projection,
     /// Whether all light that enters and is not absorbed leaves again, or the darker constant of Jensen et al. 2001.
     #[arg(long, default_value = "energy", value_parser = normalisations())]
     normalisation: Normalisation,
-    /// How light spreads in every translucent material; auto is what the material says, else what `inspect`
-    /// recommends; lambert is the opaque limit, where light leaves where it entered.
-    #[arg(long, default_value = "auto", value_parser = models())]
-    model: Model,
     /// Scale the directional dipole so that it gives back no more light than the standard one. Each of this, --reciprocal
     /// and --kappa takes the place of all that the file says about it.
     #[arg(long)]
@@ -96,14 +110,14 @@ pub struct SceneOptions {
     crop: Option<[u32; 4]>,
 }
 
-fn integrators() -> impl TypedValueParser<Value = Integrator> {
+pub fn integrators() -> impl TypedValueParser<Value = Integrator> {
     PossibleValuesParser::new(Integrator::NAMES.map(|(_, name)| name)).map(|name| match name.as_str() {
         "cloud" => Integrator::Cloud,
         _ => Integrator::Sample,
     })
 }
 
-fn projections() -> impl TypedValueParser<Value = Projection> {
+pub fn projections() -> impl TypedValueParser<Value = Projection> {
     PossibleValuesParser::new(["mis", "camera", "normal"]).map(|name| match name.as_str() {
         "camera" => Projection::Camera,
         "normal" => Projection::Normal,
@@ -140,6 +154,31 @@ fn single_scattering() -> impl TypedValueParser<Value = SingleScattering> {
 }
 
 impl SceneOptions {
+    /// As [`Subject::load`].
+    pub fn load(&self, timeline: Option<Timeline>) -> translucent::Result<(Scene, Vec<String>)> {
+        self.subject.load(timeline)
+    }
+
+    /// The settings that follow from these options; the rest are the defaults.
+    pub fn settings(&self) -> Settings {
+        self.method.settings(self.subject.settings())
+    }
+
+    /// As [`Subject::keep_from`].
+    pub fn keep_from(&self, output: &Path) -> Result<(), Failure> {
+        self.subject.keep_from(output)
+    }
+}
+
+impl Method {
+    /// `settings` with these options.
+    pub fn settings(&self, settings: Settings) -> Settings {
+        let Method { directions, integrator, projection, model } = *self;
+        Settings { directions, integrator, projection, model, ..settings }
+    }
+}
+
+impl Subject {
     /// The scene with its environment, and what a user should know about it.
     pub fn load(&self, timeline: Option<Timeline>) -> translucent::Result<(Scene, Vec<String>)> {
         let options = LoadOptions {
@@ -186,12 +225,8 @@ impl SceneOptions {
             resolution: self.resolution,
             camera: self.camera.clone().unwrap_or_default(),
             crop: self.crop,
-            directions: self.directions,
-            integrator: self.integrator,
             cloud: Cloud { points: self.cloud_points, opening: self.cloud_opening, samples: self.cloud_samples },
-            projection: self.projection,
             normalisation: self.normalisation,
-            model: self.model,
             directional: self.directional(),
             curvature: self.curvature,
             single_scattering: self.single_scattering,
@@ -202,7 +237,7 @@ impl SceneOptions {
 
     /// What the options say of the directional dipole, if any does.
     fn directional(&self) -> Option<Directional> {
-        let SceneOptions { renormalise, reciprocal, kappa, .. } = *self;
+        let Subject { renormalise, reciprocal, kappa, .. } = *self;
         let default = Directional::default();
         let asked = renormalise || reciprocal || kappa.is_some();
         asked.then(|| Directional { renormalise, reciprocal, kappa: kappa.unwrap_or(default.kappa) })

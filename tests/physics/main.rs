@@ -8,6 +8,7 @@ mod curvature;
 mod density;
 mod difference;
 mod edge;
+mod front;
 mod light;
 mod model_errors;
 mod models;

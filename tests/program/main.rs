@@ -14,6 +14,7 @@ mod profile;
 #[path = "../images/scenes.rs"]
 mod scenes;
 mod textures;
+mod tradeoff;
 mod usage;
 mod verify;
 
