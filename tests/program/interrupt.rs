@@ -70,3 +70,15 @@ fn the_second_ends_the_program_without_a_file() {
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert_eq!(folder.files(), [] as [&str; 0]);
 }
+
+/// While the first converged image is rendered there is nothing to show; a later run begins with it.
+#[test]
+fn a_tradeoff_without_results_leaves_nothing() {
+    let folder = Folder::new("interrupt-tradeoff");
+    let words = "tradeoff SPOT --resolution 24x24 --models standard --integrators sample --against none --samples 1";
+    let child = start(&folder, &format!("{words} --reference-samples 60000000 --quiet -o out"));
+    signal("INT", &child);
+    let output = end(child);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert_eq!(folder.files(), [] as [&str; 0]);
+}

@@ -216,6 +216,7 @@ impl<'a> Picture<'a> {
             .light_line_style(TRANSPARENT)
             .bold_line_style(BLACK.mix(0.12).stroke_width(unit))
             .axis_style(BLACK.stroke_width(unit))
+            .set_all_tick_mark_size(5 * unit)
             .x_desc("time to prepare and render [s]")
             .y_desc(name)
             .axis_desc_style((FONT, 15 * unit))
