@@ -110,9 +110,9 @@ impl Image {
     }
 
     /// How different both look when one follows the other on a display, 0 to 1: FLIP of R, G and B times 2^`exposure`
-    /// over black, through the sRGB transfer function in 8 bits, seen at 67 pixels per degree. P. Andersson, J. Nilsson,
-    /// T. Akenine-Moller, M. Oskarsson, K. Astrom, M. D. Fairchild, "FLIP: A Difference Evaluator for Alternating
-    /// Images", HPG 2020.
+    /// over black, through the sRGB transfer function in 8 bits, seen at 67 pixels per degree. P. Andersson, J.
+    /// Nilsson, T. Akenine-Moller, M. Oskarsson, K. Astrom, M. D. Fairchild, "FLIP: A Difference Evaluator for
+    /// Alternating Images", HPG 2020.
     ///
     /// # Errors
     /// [`Error::Setting`] if the images do not show the same pixels, or a channel is missing.

@@ -1,15 +1,16 @@
 //! Speed against accuracy: one scene rendered in many ways, each with its time and its error.
 //!
 //! An error has two parts, which are told apart. *Sampling error* is the distance from the converged image of the same
-//! model: noise, and the bias of the integrator or projection. *Model error* is the distance of that converged image from
-//! the one of the model that all are measured against, by default the table's, which is the nearest to a random walk. The
-//! *total* is the distance of a variant's image from the latter. Each is given as the root of the relative squared error
-//! ([`Image::relative_mse`]) and as FLIP ([`Image::flip`]).
+//! model: noise, and the bias of the integrator or projection. *Model error* is the distance of that converged image
+//! from the one of the model that all are measured against, by default the table's, which is the nearest to a random
+//! walk. The *total* is the distance of a variant's image from the latter. Each is given as the root of the relative
+//! squared error ([`Image::relative_mse`]) and as FLIP ([`Image::flip`]).
 //!
-//! A converged image is the mean of two with random numbers of their own, by the integrator `sample` with all projections
-//! combined; its own error is half of what lies between the two.
+//! A converged image is the mean of two with random numbers of their own, by the integrator `sample` with all
+//! projections combined; its own error is half of what lies between the two.
 //!
-//! What is rendered is kept in a folder, so that a run that was stopped, or is asked for more, renders only what is missing.
+//! What is rendered is kept in a folder, so that a run that was stopped, or is asked for more, renders only what is
+//! missing.
 
 mod converged;
 mod front;

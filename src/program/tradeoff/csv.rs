@@ -5,8 +5,8 @@ use std::fmt::Write;
 use translucent::tradeoff::{Against, Errors, Measure, Outcome};
 
 /// Every column: what was rendered; seconds, in all and by parts (`seconds` = prepare + render); errors as shares of 1,
-/// relative and FLIP: sampling, model, total, and the converged image's own; whether the variant is on the front (of its
-/// model by sampling error, of all by the total); and what came of it: rendered, kept, or why it was refused.
+/// relative and FLIP: sampling, model, total, and the converged image's own; whether the variant is on the front (of
+/// its model by sampling error, of all by the total); and what came of it: rendered, kept, or why it was refused.
 pub const COLUMNS: &str = "model,integrator,projection,reproject,irradiance,directions,samples,\
 seconds,prepare_seconds,render_seconds,kernel_seconds,start_up_seconds,\
 sampling_error,sampling_flip,model_error,model_flip,total_error,total_flip,reference_error,reference_flip,\

@@ -46,17 +46,20 @@ pub struct Tradeoff {
           default_value = "standard,better,directional,burley,table")]
     models: Vec<Model>,
     /// Integrators to compare.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = integrators(), default_value = "sample,cloud")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = integrators(),
+          default_value = "sample,cloud")]
     integrators: Vec<Integrator>,
     /// Projections to compare, of the integrator sample.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = projections(),
           default_value = "mis,camera,normal")]
     projections: Vec<Projection>,
     /// How surfaces are found, of the integrator sample.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(REPROJECT), default_value = REPROJECT[0].0)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(REPROJECT),
+          default_value = REPROJECT[0].0)]
     reproject: Vec<Choice>,
     /// How light at the sampled points is found, of the integrator sample.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(IRRADIANCE), default_value = IRRADIANCE[0].0)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(IRRADIANCE),
+          default_value = IRRADIANCE[0].0)]
     irradiance: Vec<Choice>,
     /// Numbers of samples of each pixel.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,4,16,64",
@@ -66,15 +69,16 @@ pub struct Tradeoff {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1",
           value_parser = clap::value_parser!(u32).range(1..))]
     directions: Vec<u32>,
-    /// Samples of each model's converged image; without it sixteen times the most of --samples, so that its error is about
-    /// a fourth of that one's noise.
+    /// Samples of each model's converged image; without it sixteen times the most of --samples, so that its error is
+    /// about a fourth of that one's noise.
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(2..=MOST))]
     reference_samples: Option<u32>,
     /// The model whose converged image all are measured against, or none.
     #[arg(long, value_name = "MODEL|none", default_value = "table", value_parser = against())]
     against: Compared,
     /// Exposure at which FLIP looks at the images, and the report shows them, in stops.
-    #[arg(long, value_name = "EV", default_value = "0", allow_negative_numbers = true, value_parser = arguments::finite)]
+    #[arg(long, value_name = "EV", default_value = "0", allow_negative_numbers = true,
+          value_parser = arguments::finite)]
     exposure: f64,
     /// Key of all random numbers.
     #[arg(long, value_name = "S", default_value_t = 0)]
