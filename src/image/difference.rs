@@ -1,8 +1,7 @@
 //! How far an image is from a reference.
 
-use super::{Image, png};
-use crate::{Error, Result};
-use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8, FlipPool};
+use super::{Image, flip, png};
+use crate::{Error, Result, reference::texture::decode};
 
 /// A difference: its mean over all pixels, and that of each, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,10 +34,12 @@ pub fn relative_mse(image: &Image, reference: &Image) -> Result<Difference> {
 }
 
 pub fn flip(image: &Image, reference: &Image, exposure: f64) -> Result<Difference> {
-    let [encoded, expected] = colours(image, reference)?
-        .map(|channels| FlipImageRgb8::with_data(image.width, image.height, &bytes(channels, exposure)));
-    let map = nv_flip::flip(expected, encoded, DEFAULT_PIXELS_PER_DEGREE);
-    Ok(Difference { mean: f64::from(FlipPool::from_image(&map).mean()), map: map.to_vec() })
+    let displayed = |channels| -> Vec<[f64; 3]> {
+        bytes(channels, exposure).chunks_exact(3).map(|rgb| [0, 1, 2].map(|c| decode(rgb[c]))).collect()
+    };
+    let [shown, expected] = colours(image, reference)?.map(displayed);
+    let map = flip::flip(&shown, &expected, image.width as usize);
+    Ok(Difference { mean: map.iter().map(|&value| f64::from(value)).sum::<f64>() / map.len() as f64, map })
 }
 
 pub fn encoded(image: &Image, exposure: f64) -> Result<Vec<u8>> {

@@ -2,6 +2,7 @@
 
 mod difference;
 mod exr;
+mod flip;
 mod merge;
 mod png;
 mod whole;

@@ -1,11 +1,15 @@
 //! Renders that end when the image is good enough, or the time is up: how much each pixel still needs, and who gets it.
 //!
 //! # Allocation
-//! A pixel with n samples, whose part of E^2 is e, has s = n e at one sample. For a sum of s / n that is E^2, the fewest
-//! samples in all are n = sqrt(s) sum(sqrt(s)) / E^2 (J. Neyman, J. R. Stat. Soc. 97 (1934)). A pixel's own e has seven
-//! degrees of freedom and would stop the lucky ones early, so s is the mean over [`WINDOW`] x [`WINDOW`] pixels; and
-//! every pixel gets at least [`FLOOR`] of the mean. What is left is a bias of second order: pixels that happen to look
-//! quiet together with their neighbours get fewer samples.
+//! A pixel with n samples, whose part of E^2 is e, has s = n e at one sample. The fewest samples in all for a sum of s / n
+//! are n in proportion to sqrt(s) (J. Neyman, J. R. Stat. Soc. 97 (1934)). A pixel's own e has seven degrees of freedom;
+//! by that alone the lucky ones would stop early. So s is the mean over a square of pixels, the allocation t is the largest
+//! of the means nearby and of the pixel's own s, n = sqrt(t) sum(s / sqrt(t)) / E^2, and every pixel gets at least
+//! [`FLOOR`] of the mean. What is left is a bias of second order: pixels that happen to look quiet with all around them
+//! get fewer samples.
+//!
+//! The estimate of the whole has the means too: E^2 = sum of s / n. A pixel that was lucky, and therefore has few samples,
+//! would stand there with its own small s for ever; its neighbours had no luck with it.
 
 use super::{PASS, Progress, Renderer, SUBMISSION, bands::Band, error};
 use crate::{
@@ -17,13 +21,13 @@ use crate::{
 };
 use glam::Vec3;
 use rayon::prelude::*;
-use std::{
-    ops::{ControlFlow, Range},
-    time::Instant,
-};
+use std::{ops::ControlFlow, time::Instant};
 
-/// Width of the square of pixels that are taken for alike (pixels).
-const WINDOW: usize = 5;
+/// Side of the square of pixels whose mean stands for one (pixels).
+const MEAN: usize = 5;
+
+/// Side of the square of such means of which the largest counts (pixels).
+const LARGEST: usize = 3;
 
 /// Least samples of a pixel, in parts of the mean.
 const FLOOR: f64 = 1.0 / 8.0;
@@ -90,8 +94,10 @@ impl Pace {
 struct Estimate {
     /// Samples.
     samples: Vec<u32>,
-    /// The part of the squared error that each pixel has.
-    parts: Vec<f64>,
+    /// The part of the squared error that each pixel has at one sample.
+    own: Vec<f64>,
+    /// Means of those over squares.
+    means: Vec<f64>,
     error: f64,
 }
 
@@ -179,7 +185,7 @@ impl Renderer {
                 _ if estimate.error <= goal => Some(Stop::Error),
                 Some(stop) => Some(stop),
                 None if state.done == state.total => Some(Stop::Samples),
-                None => progress(&state).is_break().then_some(Stop::Caller),
+                None => None,
             };
             if let Some(stop) = stop {
                 return Ok(Outcome { stop, error });
@@ -249,27 +255,36 @@ impl Renderer {
         let values = 3.0 * sums.iter().map(Vec::len).sum::<usize>() as f64;
         let mean = sums.iter().flatten().map(|sums| error::light(sums).element_sum()).sum::<f64>() / values;
         let k = 0.01 * mean * mean;
-        let (mut samples, mut parts) = (vec![], vec![]);
+        let (mut samples, mut own) = (vec![], vec![]);
         for (band, sums) in self.bands.iter().zip(&sums) {
             let batches: Vec<Vec3> = bytemuck::pod_collect_to_vec(&band.sums[1]);
             samples.extend(sums.iter().map(|sums| sums.samples));
             // Without any light there is no error.
             let part = |(i, sums): (usize, &Sums)| match k > 0.0 {
-                true => error::part(sums.samples, &error::batches(&batches, band.pixels as usize, i), k) / values,
+                true => {
+                    error::part(sums.samples, &error::batches(&batches, band.pixels as usize, i), k) / values
+                        * f64::from(sums.samples)
+                }
                 false => 0.0,
             };
-            parts.par_extend(sums.par_iter().enumerate().map(part));
+            own.par_extend(sums.par_iter().enumerate().map(part));
         }
-        let error = parts.iter().sum::<f64>().sqrt();
-        Ok(Estimate { samples, parts, error })
+        let means = over_squares(&own, self.prepared.view.crop_width as usize, MEAN, |values| {
+            let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            sum / count
+        });
+        let error = means.iter().zip(&samples).map(|(mean, &n)| mean / f64::from(n.max(1))).sum::<f64>().sqrt();
+        Ok(Estimate { samples, own, means, error })
     }
 
     /// The samples that each pixel should have for the error `goal`, `most` at most.
     fn targets(&self, estimate: &Estimate, goal: f64, most: u32) -> Vec<u32> {
         let width = self.prepared.view.crop_width as usize;
-        let own: Vec<f64> = estimate.parts.iter().zip(&estimate.samples).map(|(e, &n)| e * f64::from(n)).collect();
-        let roots: Vec<f64> = smooth(&own, width).into_iter().map(f64::sqrt).collect();
-        let scale = roots.iter().sum::<f64>() / (goal * AIM).powi(2);
+        let Estimate { own, means, .. } = estimate;
+        let largest = over_squares(means, width, LARGEST, |values| values.fold(0.0, f64::max));
+        let roots: Vec<f64> = largest.iter().zip(own).map(|(near, own)| near.max(*own).sqrt()).collect();
+        let shares = means.iter().zip(&roots).map(|(mean, root)| if *mean > 0.0 { mean / root } else { 0.0 });
+        let scale = shares.sum::<f64>() / (goal * AIM).powi(2);
         let floor = FLOOR * scale * roots.iter().sum::<f64>() / roots.len() as f64;
         let target = |(root, &n): (&f64, &u32)| {
             let wanted = (root * scale).max(floor).ceil().min(f64::from(u32::MAX)) as u32;
@@ -290,15 +305,18 @@ fn next_stratum(n: u32) -> u32 {
     (n / PASS + 1).saturating_mul(PASS)
 }
 
-/// Means over squares of pixels, as far as they are in the image.
-fn smooth(values: &[f64], width: usize) -> Vec<f64> {
+/// What `of` makes of the values in the square about each pixel, as far as it is in the image; row by row, then column by
+/// column.
+fn over_squares(
+    values: &[f64],
+    width: usize,
+    side: usize,
+    of: impl Fn(&mut dyn Iterator<Item = f64>) -> f64,
+) -> Vec<f64> {
     let height = values.len() / width;
-    let reach = |at: usize, size: usize| at.saturating_sub(WINDOW / 2)..(at + WINDOW / 2 + 1).min(size);
-    let mean = |range: Range<usize>, value: &dyn Fn(usize) -> f64| {
-        let count = range.len() as f64;
-        range.map(value).sum::<f64>() / count
-    };
-    let across: Vec<f64> =
-        (0..values.len()).map(|i| mean(reach(i % width, width), &|x| values[i / width * width + x])).collect();
-    (0..values.len()).map(|i| mean(reach(i / width, height), &|y| across[y * width + i % width])).collect()
+    let reach = |at: usize, size: usize| at.saturating_sub(side / 2)..(at + side / 2 + 1).min(size);
+    let along = |i: usize| of(&mut reach(i % width, width).map(|x| values[i / width * width + x]));
+    let rows: Vec<f64> = (0..values.len()).map(along).collect();
+    let across = |i: usize| of(&mut reach(i / width, height).map(|y| rows[y * width + i % width]));
+    (0..values.len()).map(across).collect()
 }

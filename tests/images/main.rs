@@ -1,6 +1,7 @@
 //! Whole renders on the device: against closed forms, against the independent area integrator, against the twins,
 //! and against themselves. Under the validation layer with synchronization checks.
 
+mod adaptive;
 mod bad_meshes;
 mod closed_forms;
 mod cloud;

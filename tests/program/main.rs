@@ -4,6 +4,7 @@ mod amber;
 mod bench;
 mod dump;
 mod faults;
+mod goals;
 mod image;
 mod inspect;
 mod interrupt;
