@@ -37,8 +37,7 @@ fn the_relative_error_is_that_of_numbers_by_hand() {
     assert_eq!(other.relative_mse(&other).expect("of one size").mean, 0.0);
 }
 
-/// Computed by flip_evaluator 1.7 from PyPI, NVIDIA's own, of the same bytes. That version applies its filters column by
-/// column and row by row, the one here as they were published: some 1e-4 lie between them.
+/// Computed by flip_evaluator 1.7 from PyPI, NVIDIA's own, of the same bytes; in f32.
 #[test]
 fn flip_is_that_of_its_authors() {
     let colour = |k: u32| {
