@@ -348,8 +348,6 @@ struct Step {
     uint count;
     // Pixels that `primary` and `count` take from the list of those to trace; 0 for all of the band.
     uint traced;
-    // 1 for the variance of all light from `resolve`, 0 for that of subsurface light.
-    uint all_light;
     // First sample in the sums, for `resolve`; of those that light the cloud.
     uint range_begin;
     // End of those that light the cloud.

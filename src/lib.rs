@@ -36,7 +36,8 @@
 //!
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
 //!   primary                       sample         reproject       accumulate, single, reflect     resolve
-//!   └► Surfaces[pixel, batch]     └► Probes      └► HitLists     └► RunningSums, BatchSums       └► Pixels ─► Image
+//!   └► Surfaces[pixel, batch],    └► Probes      └► HitLists     └► RunningSums, BatchSums       └► Pixels ─► Image
+//!      Actives                                                     count: how many samples
 //!
 //!   Integrator::Cloud, in place of sample, reproject and accumulate:
 //!   ┌─── when the lights change ───┐               ┌──────── per sample ────────┐
@@ -55,9 +56,14 @@
 //! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
 //! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups.
 //!
+//! *Lists.* `primary` lists the pixels of a batch that see something, and the kernels after it are dispatched indirectly
+//! over that list alone. Where an image is to have a certain error ([`Renderer::render_until`]), the host also lists the
+//! pixels that `primary` traces: those that the estimate from the batches' sums says need more samples.
+//!
 //! *Recordings.* [`Renderer::record`] puts the same dispatches into a command buffer of the caller's, on a device of his
 //! ([`Device::from_raw`]). There `begin` numbers the samples and `count` forgets the sums if they do not go on, so what
-//! the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it.
+//! the host would decide between submissions is decided on the device: `Progresses` and `Samples` hold it. They work on
+//! all pixels.
 //!
 //! *Changes.* Buffers stay when camera, lights, matter, environment or textures change ([`Renderer::update`], and the
 //! cheaper [`Renderer::set_camera`], [`Renderer::set_lights`], [`Renderer::set_material`]): what is different is written,

@@ -68,7 +68,7 @@ macro_rules! kernels {
             &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
     };
 }
-kernels!(begin, count, irradiance, cluster, primary, sample, reproject, accumulate, gather, reflect, single, resolve);
+kernels!(begin, irradiance, cluster, primary, sample, reproject, accumulate, gather, reflect, single, count, resolve);
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]

@@ -120,12 +120,12 @@ impl Renderer {
         let Renderer { kernels, bindings, recorder, buffers, device: lost, .. } = self;
         // First, so that both are never there at once.
         drop((kernels, bindings, recorder, buffers, lost));
-        let Renderer { settings, prepared, mut bands, begin, authored, keep_every, .. } = self;
+        let Renderer { settings, prepared, mut bands, begin, adaptive, authored, keep_every, .. } = self;
         for band in bands.iter_mut().filter(|band| band.film == Film::OnDevice) {
             band.roll_back(begin.unwrap_or(0));
         }
         let resumed = Renderer::with_bands(device, scene, &settings, prepared, vec![], bands)?;
-        Ok(Renderer { begin, authored, keep_every, ..resumed })
+        Ok(Renderer { begin, adaptive, authored, keep_every, ..resumed })
     }
 
     /// Calls `work`; if the device is lost meanwhile, once more with the renderer resumed on the device that `reopen`

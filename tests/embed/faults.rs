@@ -18,7 +18,7 @@ use std::{
     time::Duration,
 };
 use translucent::{
-    Device, Error, Image, LoadOptions, Model, Renderer, Result, Scene, Settings,
+    Device, Error, Goal, Image, LoadOptions, Model, Renderer, Result, Scene, Settings,
     ash::vk,
     gpu::{Allocation, Allocator, MemoryRequest, RawDevice},
     measure::scenes::{Eye, Mesh, gltf, matter},
@@ -425,6 +425,56 @@ fn a_render_outlives_the_loss_of_its_device() {
     // Two bands that take turns after 32 samples.
     lose(&Job::new(2, 40), None, &devices, 128 * 32);
     drop(devices);
+    apps.into_iter().for_each(App::close);
+}
+
+/// Pixels have different numbers of samples, which the sums alone know.
+#[test]
+fn a_render_to_an_error_outlives_the_loss_of_its_device() {
+    let _alone = alone();
+    let apps = [App::wrapped(wrap), App::wrapped(wrap)];
+    let [device, other] = apps.each_ref().map(staged);
+    let goal = Goal { samples: 2000, error: Some(0.1), deadline: None };
+    for bands in [1, 2] {
+        let mut job = Job::new(bands, 0);
+        job.settings.estimate_error = true;
+        let finish = |renderer: &mut Renderer| {
+            renderer.render_until(&goal, &mut |_| ControlFlow::Continue(()))?;
+            renderer.take_image()
+        };
+        let expected = finish(&mut job.renderer(&other).expect("no fault is set")).expect("no fault is set");
+        let samples = expected.channel("samples.Y").expect("contract");
+        assert!(samples.iter().any(|&n| n != samples[0]), "all pixels have {} samples", samples[0]);
+        let mut made = job.renderer(&device).expect("no fault is set");
+        set(None, false);
+        finish(&mut made).expect("no fault is set");
+        let calls = set(None, false)["vkQueueSubmit2"];
+        drop(made);
+        let before = live();
+        // Some of the many at the start and between, and the last ones all.
+        for number in (1..=calls).filter(|number| number % 23 == 1 || number + 6 > calls) {
+            let renderer = job.renderer(&device).expect("no fault is set");
+            set(Some(("vkQueueSubmit2", number, vk::Result::ERROR_DEVICE_LOST)), true);
+            let reopen = |_: &Error| {
+                set(None, false);
+                Ok(other.clone())
+            };
+            let (renderer, image) = renderer.with_recovery(&job.scene, reopen, finish).expect("lost once");
+            let at = format!("{bands} bands, submission {number} of {calls}");
+            // A band that was done before the loss makes for another plan; a pixel with as many samples has the same ones.
+            assert!(bands > 1 || image == expected, "{at}: another image");
+            assert!(image.attributes["translucent.stop"] == expected.attributes["translucent.stop"], "{at}");
+            let found = image.channel("samples.Y").expect("contract");
+            let alike = |i: &usize| found[*i] == samples[*i];
+            for (channel, expected) in image.channels.iter().zip(&expected.channels) {
+                let same = |i: usize| channel.data[i] == expected.data[i];
+                assert!((0..found.len()).filter(alike).all(same), "{at}: another {}", channel.name);
+            }
+            drop(renderer);
+            assert_eq!(live(), before, "{at}");
+        }
+    }
+    drop((device, other));
     apps.into_iter().for_each(App::close);
 }
 

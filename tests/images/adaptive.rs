@@ -71,7 +71,7 @@ fn states_its_error(scene: &Scene) {
         seeds.map(image).collect()
     };
     let adaptive = images(0..SEEDS, &goal(GOAL));
-    let uniform = images(100..100 + SEEDS, &Goal { samples: 64, error: None, deadline: None });
+    let uniform = images(100..100 + SEEDS, &Goal { samples: 32, error: None, deadline: None });
     assert!(adaptive.iter().all(|(_, outcome)| outcome.stop == Stop::Error));
     let n = f64::from(SEEDS);
     let stated = (adaptive.iter().map(|(_, o)| o.error.expect("an estimate").powi(2)).sum::<f64>() / n).sqrt();

@@ -46,7 +46,7 @@ fn inspect_lists_the_buffers_and_kernels_that_a_renderer_makes() {
 
     // A delta light on smooth matter: no highlight, no environment.
     let (kernels, slots) = check(&smooth(), &settings);
-    assert_eq!(kernels, ["primary", "sample", "reproject", "accumulate", "resolve"]);
+    assert_eq!(kernels, ["primary", "sample", "reproject", "accumulate", "count", "resolve"]);
     assert!(slots.contains(&Slot::Lights) && slots.contains(&Slot::Probes) && slots.contains(&Slot::BatchSums));
     for absent in [Slot::Environment, Slot::EnvironmentCdf, Slot::Counters] {
         assert!(!slots.contains(&absent), "{absent:?}");
@@ -54,7 +54,7 @@ fn inspect_lists_the_buffers_and_kernels_that_a_renderer_makes() {
 
     // Nothing is sampled where all that is translucent is in the opaque limit.
     let (kernels, slots) = check(&smooth(), &Settings { model: Model::Lambert, ..settings.clone() });
-    assert_eq!(kernels, ["primary", "accumulate", "resolve"]);
+    assert_eq!(kernels, ["primary", "accumulate", "count", "resolve"]);
     assert!(!slots.contains(&Slot::Probes) && !slots.contains(&Slot::HitLists));
 
     // No variance, several bands.
@@ -63,7 +63,7 @@ fn inspect_lists_the_buffers_and_kernels_that_a_renderer_makes() {
 
     // Opaque.
     let (kernels, slots) = check(&lit(json!({"name": "chalk"})), &settings);
-    assert_eq!(kernels, ["primary", "reflect", "resolve"]);
+    assert_eq!(kernels, ["primary", "reflect", "count", "resolve"]);
     assert!(!slots.contains(&Slot::Probes) && !slots.contains(&Slot::HitLists));
 
     // An image for an environment.

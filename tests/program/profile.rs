@@ -90,7 +90,16 @@ fn the_trace_opens_is_nested_and_names_what_ran() {
         (*count, *total) = (*count + 1, *total + end - begin);
     }
     // `primary`: the first stratum of each batch, and the pixels' centres.
-    let expected = [("accumulate", 9), ("primary", 9), ("reflect", 9), ("reproject", 9), ("resolve", 1), ("sample", 9)];
+    // `count`: once in each submission.
+    let expected = [
+        ("accumulate", 9),
+        ("count", 2),
+        ("primary", 9),
+        ("reflect", 9),
+        ("reproject", 9),
+        ("resolve", 1),
+        ("sample", 9),
+    ];
     assert_eq!(counts.iter().map(|(name, (count, _))| (*name, *count)).collect::<Vec<_>>(), expected);
     let samples = device.iter().filter(|span| span.2 == "sample");
     let indices: Vec<_> = samples.map(|span| span.3["sampleBegin"].as_u64()).collect();
