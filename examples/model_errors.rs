@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example model_errors -- [PATHS] [FOLDER] [NAME=FILE]...
 //!
-//! PATHS of the walk in each scene (2000000; the published table has 10000); FOLDER (src/docs) gets model_errors.md and
+//! PATHS of the walk in each scene (2000000; the published table has 100000); FOLDER (src/docs) gets model_errors.md and
 //! model_errors.csv; FILEs are closed meshes (.gltf, .glb) to try beside Spot.
 
 use std::path::PathBuf;
