@@ -11,7 +11,7 @@ pub struct Difference {
 }
 
 /// Share of the squared mean of the reference that is added below the fraction, so that dark pixels count little.
-const FLOOR: f64 = 0.01;
+pub const FLOOR: f64 = 0.01;
 
 pub fn relative_mse(image: &Image, reference: &Image) -> Result<Difference> {
     let [x, y] = colours(image, reference)?;

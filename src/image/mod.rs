@@ -8,6 +8,7 @@ mod png;
 mod whole;
 
 pub use difference::Difference;
+pub(crate) use difference::FLOOR as FLOOR_OF_MEAN;
 pub use whole::{check_writable, write_whole};
 
 use crate::{Error, Result};

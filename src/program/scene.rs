@@ -45,7 +45,7 @@ pub struct Subject {
     /// The scene, a glTF 2.0 file.
     #[arg(value_name = "SCENE.gltf|.glb")]
     pub file: PathBuf,
-    /// Size of the full image in pixels; without it 1024 high, as wide as the camera's aspect ratio asks.
+    /// Size of the full image in pixels; without it 1024 (`tradeoff`: 256) high, as wide as the camera's aspect ratio asks.
     #[arg(long, value_name = "WxH", value_parser = arguments::resolution)]
     resolution: Option<(u32, u32)>,
     /// Camera by name or index; without it the first, or one that frames the scene.

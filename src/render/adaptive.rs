@@ -19,6 +19,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     gpu::upload,
+    image::FLOOR_OF_MEAN,
     settings::Integrator,
     shared::{ACTIVE_HEADER, BATCHES, Slot, Sums},
     timeline,
@@ -265,7 +266,7 @@ impl Renderer {
         let sums: Vec<Vec<Sums>> = self.bands.iter().map(band_sums).collect();
         let values = 3.0 * sums.iter().map(Vec::len).sum::<usize>() as f64;
         let mean = sums.iter().flatten().map(|sums| error::light(sums).element_sum()).sum::<f64>() / values;
-        let k = 0.01 * mean * mean;
+        let k = FLOOR_OF_MEAN * mean * mean;
         let (mut samples, mut own) = (vec![], vec![]);
         for (band, sums) in self.bands.iter().zip(&sums) {
             let batches: Vec<Vec3> = bytemuck::pod_collect_to_vec(&band.sums[1]);

@@ -14,6 +14,9 @@ const BAND_PIXELS: u32 = 1 << 18;
 /// Workgroups of one dimension that every device allows (Vulkan 1.3, table 58).
 const GROUPS: u64 = 65_535;
 
+// Of each batch an indirect dispatch's arguments, and a count.
+const _: () = assert!(ACTIVE_HEADER == 4 * BATCHES);
+
 /// Consecutive rows that the device works on at a time.
 pub struct Band {
     /// In the full image.

@@ -138,8 +138,56 @@ pub fn primary(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         let elsewhere = all.iter().enumerate().filter(|(i, _)| !staged.batch().contains(i));
         let written = elsewhere.filter(|(_, surface)| **surface != Surface::default()).count();
         verdict.require(written == 0, || format!("{name}: {written} surfaces of other batches are written"));
+        for shown in [false, true] {
+            listed(context, staged, found, shown, &mut verdict)?;
+        }
     }
     Ok(verdict)
+}
+
+/// That `primary` with lists traces every third pixel that is listed and no other, and lists those that see something, as
+/// `surfaces` says; all of them where the environment is shown.
+fn listed(
+    context: &mut Context,
+    staged: &Staged,
+    surfaces: &[Surface],
+    shown: bool,
+    verdict: &mut Verdict,
+) -> Result<()> {
+    let mut inputs = staged.case.inputs();
+    let view = View { show_environment: shown.into(), ..*inputs.view };
+    (inputs.view, inputs.features.listed) = (&view, 1);
+    let count = staged.surfaces.len();
+    let traced: Vec<u32> = (0..count as u32).step_by(3).collect();
+    let step = Step { traced: traced.len() as u32, ..staged.step };
+    let mut words = vec![0; ACTIVE_HEADER as usize + (1 + BATCHES as usize) * count];
+    words[ACTIVE_HEADER as usize..][..traced.len()].copy_from_slice(&traced);
+    let blank = vec![Surface::default(); count * BATCHES as usize];
+    let buffers: [(Slot, &[u8]); 2] =
+        [(Slot::Surfaces, bytemuck::cast_slice(&blank)), (Slot::Actives, bytemuck::cast_slice(&words))];
+    let loaded = context.bench.run("primary", &inputs, &staged.case.scene.nodes, &step, &buffers)?;
+    let (all, words): (Vec<Surface>, Vec<u32>) =
+        (context.bench.read(&loaded, Slot::Surfaces)?, context.bench.read(&loaded, Slot::Actives)?);
+    let seen = |i: &u32| shown || surfaces[*i as usize].triangle != MISS;
+    let expected: Vec<u32> = traced.iter().copied().filter(seen).collect();
+    let batch = staged.step.sample_index % BATCHES;
+    let header = &words[4 * batch as usize..][..4];
+    let list = ACTIVE_HEADER as usize + (1 + batch as usize) * count;
+    let mut found = words[list..][..expected.len()].to_vec();
+    found.sort_unstable();
+    let name = &staged.case.name;
+    let groups = (expected.len() as u32).div_ceil(WORKGROUP);
+    verdict.require(header[0] == groups && header[3] == expected.len() as u32, || {
+        format!("{name}: {header:?} for {groups} workgroups of {} pixels", expected.len())
+    });
+    verdict.require(found == expected, || format!("{name}: other pixels are listed"));
+    let right = |(i, surface): (usize, &Surface)| match i % 3 {
+        0 => *surface == surfaces[i],
+        _ => *surface == Surface::default(),
+    };
+    let traced_alone = all[staged.batch()].iter().enumerate().all(right);
+    verdict.require(traced_alone, || format!("{name}: other pixels are traced"));
+    Ok(())
 }
 
 /// Probes, against their own size.

@@ -91,6 +91,9 @@ mutants! {
     "count.comp", "index", "kernel.count": "b < BATCHES * BATCHED; b++" => "b < BATCHES * BATCHED - 1u; b++";
     "count.comp", "lost factor", "kernel.count": "samples += step_.count" => "samples += 1u";
     "primary.comp", "sign", "kernel.primary": "- ndc.y * view.up" => "+ ndc.y * view.up";
+    "primary.comp", "index", "kernel.primary": "(1u + batch) * step_.pixel_count" => "batch * step_.pixel_count";
+    "primary.comp", "operator", "kernel.primary": "place % gl_WorkGroupSize.x == 0u" => "place / gl_WorkGroupSize.x == 0u";
+    "primary.comp", "lost condition", "kernel.primary": "surface.triangle != MISS || " => "";
     "pixel.glsl", "index", "kernel.primary": "return batch * step_.pixel_count + index;" =>
         "return (batch + 1u) % BATCHES * step_.pixel_count + index;";
     "sample.comp", "sign", "kernel.sample": "probe.t_max = -b + half_chord;" => "probe.t_max = b + half_chord;";
