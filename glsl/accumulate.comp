@@ -5,6 +5,7 @@
 #include "random.glsl"
 #include "pixel.glsl"
 #include "active.glsl"
+#include "tile.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "boundary.glsl"
@@ -18,8 +19,9 @@ SHADINGS(readonly);
 #include "arriving.glsl"
 SURFACES(readonly);
 PROBES(readonly);
-HIT_LISTS(readonly);
+HIT_LISTS(read_write);
 #include "mixture.glsl"
+#include "shared_hit.glsl"
 
 // Weights of the second and third vertex at a point of a triangle, relative to its first.
 vec2 weights(Triangle triangle, vec3 point) {
@@ -69,6 +71,7 @@ void main() {
     uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Surface surface = surfaces[surface_index(index)];
+    if (REUSE != 0u && step_.ray_begin == 0u) hit_lists[index].light = vec3(0.0);
     bool covered = surface.triangle != MISS;
     if (step_.count != 0u) count_covered(index, covered);
     if (!covered || step_.ray_count == 0u) return;
@@ -85,8 +88,9 @@ void main() {
         table_at(m, surface);
     }
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
-    uint key = pixel_key(view.seed, pixel_position(view, index));
     uint batch = sample_index() % BATCHES;
+    Place place = place_of(view, index, batch);
+    uint key = pixel_key(view.seed, place.tile);
 
     // Where light enters. In the opaque limit that is where it leaves, and there are no probes.
     vec3 delta = vec3(0.0);
@@ -117,7 +121,7 @@ void main() {
             uint hit = j;
             if (j == kept) {
                 if (!(total > 0.0)) return;
-                float threshold = unit(scramble(sample_point(DIM_HIT), dimension_key(key, batch, DIM_HIT))) * total;
+                float threshold = coordinate(place, key, batch, DIM_HIT) * total;
                 hit = 0u;
                 for (uint i = 1u; i < kept; i++) {
                     if (cumulative[i - 1u] <= threshold && cumulative[i] > cumulative[i - 1u]) hit = i;
@@ -140,7 +144,9 @@ void main() {
         }
         own_value = has_model(local, MODEL_DIRECTIONAL);
         // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
-        factor = (own_value ? vec3(given) : f) * (total / (f.x + f.y + f.z)) * max(1.0, float(count) / float(MAX_HITS));
+        float weight = total * max(1.0, float(count) / float(MAX_HITS));
+        // The tile's pixels bring their own values of the hit, and divide by all of them.
+        factor = REUSE != 0u ? vec3(weight) : (own_value ? vec3(given) : f) * (weight / (f.x + f.y + f.z));
     }
 
     vec3 n = s.side * geometric_normal(triangles[lit]);
@@ -151,13 +157,22 @@ void main() {
     vec3 entering = vec3(0.0);
     for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
         vec3 direction;
-        vec3 light = arriving(view, k, position, n, shading_n, key, batch, sample_index() / BATCHES, direction);
+        vec3 light = arriving(view, k, position, n, shading_n, place, key, batch,
+            sample_index() / BATCHES, direction);
         if (light != vec3(0.0)) {
             light *= crossing(local, dot(shading_n, direction), entry_share);
             light *= obliqueness(local, dot(shading_n, direction), false);
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }
+    }
+
+    if (REUSE != 0u && !has_model(m, MODEL_LAMBERT)) {
+        if (has_texture(TEXTURE_BASE_COLOR)) entering *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb;
+        if (entering == vec3(0.0)) return;
+        hit_lists[index].delta = delta;
+        hit_lists[index].light += entering * factor / tile_value(tile_of(view, place, batch), view.crop_width, m, index, delta);
+        return;
     }
 
     float cos_eye = dot(s.shading_normal, s.wo);

@@ -8,8 +8,8 @@ float direction_density(View view, vec3 direction, float c) {
 }
 
 // Ray k of the sample `number` of a batch: radiance x cosine / density of where it comes from, 0 if that is hidden or
-// below the horizon; `direction` is where. n is the geometric normal, `key` that of the pixel's random numbers.
-vec3 arriving(View view, uint k, vec3 position, vec3 n, vec3 shading_n, uint key, uint batch, uint number,
+// below the horizon; `direction` is where. n is the geometric normal, `key` that of the random numbers.
+vec3 arriving(View view, uint k, vec3 position, vec3 n, vec3 shading_n, Place place, uint key, uint batch, uint number,
     out vec3 direction) {
     uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
     float distance = 1e30;
@@ -23,7 +23,7 @@ vec3 arriving(View view, uint k, vec3 position, vec3 n, vec3 shading_n, uint key
         light = incoming.irradiance * max(dot(shading_n, direction), 0.0);
     } else if (EMISSIVE != 0 && k < first_direction) {
         uint j = k - view.light_count;
-        vec2 u = random_point(key, batch, DIM_EMITTER, number * view.directions + j);
+        vec2 u = point_at(place, key, batch, DIM_EMITTER, number * view.directions + j);
         EmitterPoint point = draw_emitter(view, position, n * SHADOW_OFFSET, u);
         direction = point.direction;
         distance = point.distance * EMITTER_REACH;
@@ -34,7 +34,7 @@ vec3 arriving(View view, uint k, vec3 position, vec3 n, vec3 shading_n, uint key
             direction, directional) * (c / float(view.directions));
     } else {
         uint j = k - first_direction;
-        vec2 u = random_point(key, batch, DIM_LIGHT, number * view.directions + j);
+        vec2 u = point_at(place, key, batch, DIM_LIGHT, number * view.directions + j);
         // The image and the cosine, half of the directions each, combined by the balance heuristic.
         bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
         if (image && u.x < 0.5) {

@@ -4,6 +4,7 @@
 #include "math.glsl"
 #include "random.glsl"
 #include "pixel.glsl"
+#include "tile.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "boundary.glsl"
@@ -25,12 +26,13 @@ void main() {
     Material m = materials[shadings[point.triangle].material];
     vec3 shading_n = shading_normal(shadings[point.triangle], point.triangle, point.barycentric);
     float share = roughness_share(point.triangle, point.barycentric);
-    uint key = pixel_key(view.seed, uvec2(index, POINTS_ROW));
+    Place place = Place(uvec2(index, POINTS_ROW), 0u);
+    uint key = pixel_key(view.seed, place.tile);
     vec3 flux = vec3(0.0), oblique = vec3(0.0);
     for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
         vec3 direction;
-        vec3 light = arriving(view, k, point.position, point.normal, shading_n, key, sample_index() % BATCHES,
-            sample_index() / BATCHES, direction);
+        vec3 light = arriving(view, k, point.position, point.normal, shading_n, place, key,
+            sample_index() % BATCHES, sample_index() / BATCHES, direction);
         if (light != vec3(0.0)) {
             float c = dot(shading_n, direction);
             light *= crossing(m, c, share);

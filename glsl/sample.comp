@@ -5,6 +5,7 @@
 #include "random.glsl"
 #include "pixel.glsl"
 #include "active.glsl"
+#include "tile.glsl"
 #include "profile.glsl"
 #include "texture.glsl"
 #include "projection.glsl"
@@ -23,6 +24,12 @@ void main() {
     probe.t_min = 1.0;
     probe.t_max = 0.0;
     probe.radius = 0.0;
+    probe.stamp = 0u;
+    probe.group = 0u;
+    probe.table_node = 0u;
+    probe.table_weight = 1.0;
+    probe.table_bend = vec2(0.0);
+    probe.table_scale = 0.0;
     probes[index] = probe;
     Surface surface = surfaces[surface_index(index)];
     if (surface.triangle == MISS) return;
@@ -32,10 +39,11 @@ void main() {
 
     View view = views[0];
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
-    uint key = pixel_key(view.seed, pixel_position(view, index));
     uint batch = sample_index() % BATCHES;
+    Place place = place_of(view, index, batch);
+    uint key = pixel_key(view.seed, place.tile);
     float u[4];
-    for (uint i = 0; i < 4; i++) u[i] = unit(scramble(sample_point(i), dimension_key(key, batch, i)));
+    for (uint i = 0; i < 4; i++) u[i] = coordinate(place, key, batch, i);
     if (MIXED != 0) {
         Mixture mixture = mixture_at(surface);
         if (mixture.count == 0u) return;
@@ -43,6 +51,16 @@ void main() {
     } else {
         if (m.component_cdf[8] == 0.0) return;
         if (has_model(m, MODEL_TABLE)) table_at(m, surface);
+    }
+    if (REUSE != 0u) {
+        probe.stamp = sample_index() + 1u;
+        probe.group = 2u * triangles[surface.triangle].set + (s.side < 0.0 ? 1u : 0u);
+        if (has_model(m, MODEL_TABLE)) {
+            probe.table_node = table_node;
+            probe.table_weight = table_weight;
+            probe.table_bend = table_bend;
+            probe.table_scale = table_scale;
+        }
     }
 
     vec4 fractions = technique_fractions(dot(s.wo, s.normal));

@@ -159,6 +159,8 @@ const uint DIM_SINGLE = 16u;
 const uint DIM_SINGLE_LIGHT = 18u;
 // Dimensions 20 and 21: point of an emitter for that point (a point per direction).
 const uint DIM_SINGLE_EMITTER = 20u;
+// Added to a dimension for what the place in a tile brings to it.
+const uint DIM_PLACE = 32u;
 // Of `functions`: x y + z, x / y and sqrt |x|, for what the device's arithmetic is.
 const uint FUNCTION_ARITHMETIC = 0u;
 // Of `functions`: dot, length and cross product.
@@ -272,6 +274,8 @@ layout(constant_id = 20) const uint RECORDED = 0;
 layout(constant_id = 11) const uint MIXED = 0;
 // One of INTEGRATOR_*.
 layout(constant_id = 12) const uint INTEGRATOR = 0;
+// Width of the tiles in which pixels share their lit hits, a power of 2; 0 where they do not.
+layout(constant_id = 13) const uint REUSE = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -605,6 +609,16 @@ struct Probe {
     float t_max;
     // Camera projection only: radius in the tangent plane.
     float radius;
+    // Tiles only: 1 + the sample to which the following belongs, also where it has no probe; 0 for none.
+    uint stamp;
+    // 2 x the set, and 1 where its inner side is seen: pixels that have the same share hits.
+    uint group;
+    // Tabulated profile at the surface that is seen: the first of two curvatures, its weight, how distances bend for
+    // both, and 1/4a^2.
+    uint table_node;
+    float table_weight;
+    vec2 table_bend;
+    float table_scale;
 };
 
 // Where a probe meets surfaces of its set, written by `reproject`.
@@ -613,6 +627,9 @@ struct Hits {
     uint count;
     float t[8];
     uint triangle[8];
+    // Tiles only, written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
+    vec3 delta;
+    vec3 light;
 };
 
 // Running sums of a pixel, compensated: the true sum is `x + x_carry` (Neumaier / TwoSum).

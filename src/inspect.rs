@@ -146,8 +146,8 @@ impl<'a> Inspection<'a> {
             "image": {
                 "width": view.width,
                 "height": view.height,
-                "rows": [plan.prepared.rows.start, plan.prepared.rows.end],
-                "columns": [view.crop_x, view.crop_x + view.crop_width],
+                "rows": [plan.prepared.shown[1], plan.prepared.shown[3]],
+                "columns": [plan.prepared.shown[0], plan.prepared.shown[2]],
                 "bands": plan.bands,
                 "camera": plan.prepared.camera.name,
                 "lens": match plan.prepared.camera.lens {

@@ -14,7 +14,7 @@ use crate::{
     model::{self, Advice, Detail},
     reference::{Inputs, emitter, light, texture},
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Scene, Wrap},
-    settings::{Directional, Integrator, Settings},
+    settings::{Directional, Integrator, Projection, Settings},
     shared::{
         self, Balance, Cluster, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, Texture, View,
     },
@@ -52,6 +52,8 @@ pub struct Prepared {
     pub camera: Camera,
     /// Rows that are rendered: from the first, exclusive of the last.
     pub rows: std::ops::Range<u32>,
+    /// The part of the image that is asked for: x0, y0, x1, y1, exclusive of x1 and y1.
+    pub shown: [u32; 4],
     /// Whether any material that is shown scatters light: otherwise `accumulate` does not run.
     pub has_translucent: bool,
     /// Whether any of those is not in the opaque limit: otherwise `sample` and `reproject` do not run either.
@@ -146,6 +148,9 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         let problem = format!("{x0},{y0},{x1},{y1} is not a part of {width}x{height} pixels");
         return Err(Error::setting("crop", problem));
     }
+    if ![1, 2, 4, 8].contains(&settings.reuse) {
+        return Err(Error::setting("reuse", format!("{} is not 1, 2, 4 or 8", settings.reuse)));
+    }
     if !(1..=65_536).contains(&settings.directions) {
         return Err(Error::setting("directions", format!("{} is not between 1 and 65536", settings.directions)));
     }
@@ -173,8 +178,6 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     let emitters = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
     let mut view = view_of(&camera, frame, width, height);
-    view.crop_x = x0;
-    view.crop_width = x1 - x0;
     view.seed = settings.seed;
     view.directions = settings.directions;
     view.light_count = lights.len() as u32;
@@ -216,6 +219,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     let translucent = shown.filter(|material| material.flags & TRANSLUCENT != 0);
     let models: u32 = translucent.fold(0, |mask, material| mask | 1 << material.model);
     let emits = !emitters.is_empty();
+    let has_probes = models & !(1 << MODEL_LAMBERT) != 0 && settings.integrator == Integrator::Sample;
     let features = Features {
         projection: settings.projection as u32,
         environment: kind,
@@ -228,15 +232,20 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         recorded: u32::from(settings.recording),
         mixtures: u32::from(!mixtures.is_empty()),
         integrator: settings.integrator as u32,
+        reuse: if has_probes && shares_hits(settings, models, kinds, &mixtures) { settings.reuse } else { 0 },
         ..Features::default()
     };
+    // Whole tiles, so that the pixels shown do not depend on the crop; a recording's buffers hold these alone.
+    let margin = if settings.recording { 0 } else { features.reuse.saturating_sub(1) };
+    let columns = x0.saturating_sub(margin)..(x1 + margin).min(width);
+    (view.crop_x, view.crop_width) = (columns.start, columns.end - columns.start);
     Ok(Prepared {
         features,
         view,
         has_single: materials.iter().any(|material| material.scattering != Vec3::ZERO),
         materials,
         has_translucent: models != 0,
-        has_probes: models & !(1 << MODEL_LAMBERT) != 0 && settings.integrator == Integrator::Sample,
+        has_probes,
         has_reflection: opaque
             || emits
             || settings.show_environment
@@ -257,8 +266,19 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         clusters,
         advice,
         camera,
-        rows: y0..y1,
+        rows: y0.saturating_sub(margin)..(y1 + margin).min(height),
+        shown: [x0, y0, x1, y1],
     })
+}
+
+/// Whether pixels of a tile may share their hits: all have the same value of a hit, but for its distance.
+fn shares_hits(settings: &Settings, models: u32, textures: u32, mixtures: &[shared::Mixture]) -> bool {
+    let of_medium = 1 << shared::TEXTURE_SCATTER_COLOR | 1 << shared::TEXTURE_SCATTER_STRENGTH;
+    settings.reuse > 1
+        && settings.projection == Projection::Mis
+        && models & (1 << shared::MODEL_DIRECTIONAL) == 0
+        && textures & of_medium == 0
+        && mixtures.is_empty()
 }
 
 /// The camera's part of a View, in internal units.

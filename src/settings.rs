@@ -209,7 +209,8 @@ pub struct Settings {
     /// Width and height (pixels); without it 1024x1024, or the camera's aspect ratio at that height.
     pub resolution: Option<(u32, u32)>,
     pub camera: CameraChoice,
-    /// Rendered part of the image, `[x0, y0, x1, y1]`, exclusive of x1 and y1 (pixels).
+    /// Rendered part of the image, `[x0, y0, x1, y1]`, exclusive of x1 and y1 (pixels). Pixels around it whose hits it
+    /// [shares](Settings::reuse) are rendered and left out; recordings have no such pixels.
     pub crop: Option<[u32; 4]>,
     /// Incoming environment directions at each position, N >= 1.
     pub directions: u32,
@@ -226,6 +227,12 @@ pub struct Settings {
     pub curvature: bool,
     /// Single scattering of every translucent material; `Auto` leaves it to each.
     pub single_scattering: SingleScattering,
+    /// Width of the tiles of pixels that share the hits they light, 1 (none), 2, 4 or 8; see
+    /// [`reuse`](mod@crate::reference::reuse). Noise falls and goes together in neighbouring pixels, so the mean of many
+    /// pixels is no better than it was; no expectation changes. Left out where it does not hold: with the
+    /// [cloud](Integrator::Cloud), other projections than `Mis`, the directional dipole, sets of several materials and
+    /// media that a texture changes.
+    pub reuse: u32,
     /// Key of all random numbers.
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
@@ -242,7 +249,8 @@ pub struct Settings {
     /// ([`shared::SHADOW_OFFSET`]) and, for matter that f32 cannot resolve, a mean free path kept within its reach.
     pub radius_tail: f64,
     /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows. Without it 2^18, or
-    /// what the device's bindings and memory allow. The image does not depend on it.
+    /// what the device's bindings and memory allow. The image does not depend on it, but for noise where a band's edge
+    /// cuts tiles ([`reuse`](Settings::reuse)).
     pub band_pixels: Option<u32>,
     /// Makes what [`Renderer::record`](crate::Renderer::record) needs: one band, whatever `band_pixels` says, colours
     /// in a buffer of their own, and the count of samples on the device. The image does not depend on it.
@@ -269,6 +277,7 @@ impl Default for Settings {
             directional: None,
             curvature: true,
             single_scattering: SingleScattering::Auto,
+            reuse: 8,
             seed: 0,
             show_environment: false,
             variance: true,

@@ -69,7 +69,12 @@ fn image(setup: &Setup, matter: &Matter, width: f64) -> Result<Image> {
     let lens = -width / 2.0 * f64::from(SIZE.1) / f64::from(SIZE.0);
     let eye = Eye { eye: at + DVec3::Z * width, at, lens };
     let scene = scene_in_uniform_light(&gltf(&[(mesh, 0)], std::slice::from_ref(&matter.material), &[], &eye))?;
-    setup.render(matter, &scene, Settings { resolution: Some(SIZE), ..Settings::default() }, setup.samples(2048))
+    setup.render(
+        matter,
+        &scene,
+        Settings { resolution: Some(SIZE), reuse: 1, ..Settings::default() },
+        setup.samples(2048),
+    )
 }
 
 fn by_distance(matter: &Matter, c: usize, name: String, light: &[f64], width: f64) -> Series {

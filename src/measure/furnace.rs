@@ -50,7 +50,12 @@ fn image(setup: &Setup, matter: &Matter) -> Result<Image> {
     let height = reach / 2000.0;
     let eye = Eye { eye: DVec3::new(0.0, -height, height), at: DVec3::ZERO, lens: 2.0 * HALF_VIEW.to_radians() };
     let scene = scene_in_uniform_light(&gltf(&[(mesh, 0)], std::slice::from_ref(&matter.material), &[], &eye))?;
-    setup.render(matter, &scene, Settings { resolution: Some(SIZE), ..Settings::default() }, setup.samples(8192))
+    setup.render(
+        matter,
+        &scene,
+        Settings { resolution: Some(SIZE), reuse: 1, ..Settings::default() },
+        setup.samples(8192),
+    )
 }
 
 /// Cosine between the normal and a ray, by place in the image (pixels).

@@ -73,7 +73,12 @@ fn image(setup: &Setup, matter: &Matter, period: f64) -> Result<Image> {
     let eye = Eye { eye: DVec3::Z * period, at: DVec3::ZERO, lens };
     let opaque = json!({"name": "bars"});
     let scene = scene(&gltf(&[(body, 0), (bars, 1)], &[matter.material.clone(), opaque], &[light], &eye))?;
-    setup.render(matter, &scene, Settings { resolution: Some(SIZE), ..Settings::default() }, setup.samples(1024))
+    setup.render(
+        matter,
+        &scene,
+        Settings { resolution: Some(SIZE), reuse: 1, ..Settings::default() },
+        setup.samples(1024),
+    )
 }
 
 /// M at k and its harmonics.

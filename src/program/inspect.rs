@@ -83,8 +83,9 @@ fn image(inspection: &Inspection) -> String {
     let prepared = &inspection.plan.prepared;
     let view = &prepared.view;
     let size = format!("{}x{}", view.width, view.height);
-    let crop = (view.crop_width, prepared.rows.len() as u32) != (view.width, view.height);
-    let size = if crop { format!("{}x{} of {size}", view.crop_width, prepared.rows.len()) } else { size };
+    let [x0, y0, x1, y1] = prepared.shown;
+    let crop = (x1 - x0, y1 - y0) != (view.width, view.height);
+    let size = if crop { format!("{}x{} of {size}", x1 - x0, y1 - y0) } else { size };
     let lens = match prepared.camera.lens {
         Lens::Perspective { .. } => "perspective",
         Lens::Orthographic { .. } => "orthographic",

@@ -33,6 +33,9 @@ pub struct Method {
     /// normal axis alone.
     #[arg(long, default_value = "mis", value_parser = projections())]
     projection: Projection,
+    /// Width in pixels of the tiles that share the hits they light, which divides noise among them; 1 shares none.
+    #[arg(long, value_name = "1|2|4|8", default_value = "8", value_parser = reuses())]
+    reuse: u32,
     /// How light spreads in every translucent material; auto is what the material says, else what `inspect`
     /// recommends; lambert is the opaque limit, where light leaves where it entered.
     #[arg(long, default_value = "auto", value_parser = models())]
@@ -125,6 +128,10 @@ pub fn projections() -> impl TypedValueParser<Value = Projection> {
     })
 }
 
+fn reuses() -> impl TypedValueParser<Value = u32> {
+    PossibleValuesParser::new(["1", "2", "4", "8"]).map(|width| width.parse().expect("the parser passes numbers alone"))
+}
+
 fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
     PossibleValuesParser::new(["energy", "jensen2001"]).map(|name| match name.as_str() {
         "jensen2001" => Normalisation::Jensen2001,
@@ -173,8 +180,8 @@ impl SceneOptions {
 impl Method {
     /// `settings` with these options.
     pub fn settings(&self, settings: Settings) -> Settings {
-        let Method { directions, integrator, projection, model } = *self;
-        Settings { directions, integrator, projection, model, ..settings }
+        let Method { directions, integrator, projection, reuse, model } = *self;
+        Settings { directions, integrator, projection, reuse, model, ..settings }
     }
 }
 

@@ -23,36 +23,21 @@
 
 use super::light::{self, FAR};
 use super::math::cosine_direction;
-use super::pixel::position;
 use super::profile::{self, Directional, Matter, shapes, shapes_shifted};
 use super::projection::{
     Seen, balance, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal,
 };
-use super::random::{batch, key, scramble, sobol, unit};
 use super::rough::{crossing, leaving_share};
-use super::sample::coordinate;
 use super::sums::Contribution;
+use super::tile::{Place, coordinate, direction_point};
 use super::{Inputs, emitter, intersect, mixture, texture};
 use crate::shared::{
-    BATCHES, DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_CLOUD, MAX_HITS, MISS,
+    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_CLOUD, MAX_HITS, MISS,
     MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
     TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
-
-/// Coordinates of direction or emitter's point `j` of the step's sample, at the pixel in that column and row.
-pub(super) fn direction_point(inputs: &Inputs, step: &Step, (px, py): Place, j: u32, dimension: u32) -> (f64, f64) {
-    let number = (step.sample_index / BATCHES).wrapping_mul(inputs.view.directions).wrapping_add(j);
-    let coordinate = |d: u32| {
-        let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension + d);
-        unit(scramble(sobol(number, d as usize), key))
-    };
-    (coordinate(0), coordinate(1))
-}
-
-/// Column and row of a pixel in the full image.
-pub(super) type Place = (u32, u32);
 
 /// Where shadow rays of a point begin. `normal` is the geometric one.
 pub(super) fn lifted(point: DVec3, normal: DVec3) -> DVec3 {
@@ -102,6 +87,10 @@ pub fn accumulate(
     if inputs.features.integrator == INTEGRATOR_CLOUD && matter.material.model != MODEL_LAMBERT {
         return Contribution::default();
     }
+    // Hits of the others are shared.
+    if inputs.features.reuse != 0 && matter.material.model != MODEL_LAMBERT {
+        return Contribution::default();
+    }
     let (delta, triangle, factor) = if matter.material.model == MODEL_LAMBERT {
         let weights = surface.barycentric.as_dvec2();
         let strength = texture::medium(inputs, matter.material, surface.triangle, weights).strength;
@@ -117,14 +106,7 @@ pub fn accumulate(
     let entry = Entry::new(inputs, material, seen.side, point, triangle);
     let local = texture::medium(inputs, material, triangle, entry.weights);
     let local = Matter { material: &local, ..matter };
-    let exit_share = texture::roughness_share(inputs, surface.triangle, surface.barycentric.as_dvec2());
-    let leaving = entry.tint
-        * tint(inputs, surface.triangle, surface.barycentric.as_dvec2())
-        * crossing(inputs, matter.material, seen.shading_normal.dot(seen.wo), exit_share)
-        * leaving_share(inputs, matter.material, exit_share)
-        * profile::obliqueness(local, seen.shading_normal.dot(seen.wo), true)
-        * balance(inputs, material, surface)
-        * if inputs.mixtures.is_empty() { DVec3::ONE } else { matter.material.exit.as_dvec3() };
+    let leaving = leaving(inputs, matter, local, &seen, surface);
     let given = inputs.features.projection == PROJECTION_CAMERA;
     let members = mixture::members(inputs, matter.material, surface.triangle);
     let rate = members.first().map_or(0.0, |member| f64::from(member.camera_rate));
@@ -133,8 +115,21 @@ pub fn accumulate(
         MODEL_DIRECTIONAL => directed(local, &seen, delta, entry.shading, wi, exponent),
         _ => profile::obliqueness(local, entry.shading.dot(wi), false),
     };
-    let place = position(inputs.view, step, index);
-    Contribution::of(leaving * factor * entering_light(inputs, step, place, &entry, value))
+    let place = Place::of(inputs, step, index);
+    Contribution::of(entry.tint * leaving * factor * entering_light(inputs, step, place, &entry, value))
+}
+
+/// What light that leaves is multiplied by: `matter` is that of the surface that is seen, `local` that which it entered.
+pub(super) fn leaving(inputs: &Inputs, matter: Matter, local: Matter, seen: &Seen, surface: &Surface) -> DVec3 {
+    let weights = surface.barycentric.as_dvec2();
+    let share = texture::roughness_share(inputs, surface.triangle, weights);
+    let cos = seen.shading_normal.dot(seen.wo);
+    tint(inputs, surface.triangle, weights)
+        * crossing(inputs, matter.material, cos, share)
+        * leaving_share(inputs, matter.material, share)
+        * profile::obliqueness(local, cos, true)
+        * balance(inputs, local.material, surface)
+        * if inputs.mixtures.is_empty() { DVec3::ONE } else { matter.material.exit.as_dvec3() }
 }
 
 /// The base colour's texture, which tints what crosses the surface; the factor is in the profile's strength.
@@ -208,7 +203,7 @@ pub fn choose(
         })
         .collect();
     let total: f64 = terms.iter().map(|(_, w)| w).sum();
-    let threshold = coordinate(inputs, step, index, DIM_HIT) * total;
+    let threshold = coordinate(inputs, step, Place::of(inputs, step, index), DIM_HIT) * total;
     let mut sum = 0.0;
     let chosen = terms.iter().position(|(_, w)| {
         sum += w;

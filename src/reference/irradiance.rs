@@ -12,6 +12,7 @@
 use super::Inputs;
 use super::accumulate::{Entry, entering_light};
 use super::boundary::cos_refracted;
+use super::tile::Place;
 use crate::shared::{Cluster, POINTS_ROW, Step};
 use glam::DVec3;
 
@@ -28,7 +29,7 @@ pub fn irradiance(inputs: &Inputs, step: &Step, index: u32, point: &Cluster) -> 
     let begin = step.ray_begin.max(lights);
     let other = Step { ray_begin: begin, ray_count: end.saturating_sub(begin), ..*step };
     let light = |value: &dyn Fn(DVec3) -> DVec3| {
-        let of = |step: &Step| entering_light(inputs, step, (index, POINTS_ROW), &entry, value);
+        let of = |step: &Step| entering_light(inputs, step, Place::alone((index, POINTS_ROW)), &entry, value);
         f64::from(point.area) * entry.tint * (of(&delta) + of(&other) / samples)
     };
     let oblique = |wi: DVec3| DVec3::splat(1.0 - cos_refracted(material.ior.into(), entry.shading.dot(wi)));

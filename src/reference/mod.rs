@@ -25,17 +25,20 @@ pub mod random;
 pub mod reflect;
 pub mod reproject;
 pub mod resolve;
+pub mod reuse;
 pub mod rough;
 pub mod sample;
+pub mod shared_hit;
 pub mod single;
 pub mod strict;
 pub mod sums;
 pub mod texture;
+pub mod tile;
 pub mod walk;
 
 use crate::shared::{
-    BATCHES, Balance, Coordinates, Emitter, Features, Light, Material, Mixture, Pixel, Shading, Step, Sums, Surface,
-    Texture, Triangle, View,
+    BATCHES, Balance, Coordinates, Emitter, Features, Hits, Light, Material, Mixture, Pixel, Probe, Shading, Step,
+    Sums, Surface, Texture, Triangle, View,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -92,33 +95,48 @@ pub fn step(inputs: &Inputs, sample_index: u32, rows: Range<u32>, samples: Range
 /// The rows `rows` of the image with the samples `samples`, by the twins in the order of the kernels.
 pub fn render(inputs: &Inputs, rows: Range<u32>, samples: Range<u32>) -> Vec<Pixel> {
     let pixels = rows.len() as u32 * inputs.view.crop_width;
-    (0..pixels).into_par_iter().map(|index| render_pixel(inputs, index, rows.clone(), samples.clone())).collect()
-}
-
-fn render_pixel(inputs: &Inputs, index: u32, rows: Range<u32>, samples: Range<u32>) -> Pixel {
-    let mut sums = Sums::default();
-    let mut batch_sums = [Vec3::ZERO; BATCHES as usize];
-    // The first surface of each batch, and its stratum.
-    let mut first: [Option<(u32, Surface)>; BATCHES as usize] = [None; BATCHES as usize];
+    let mut all = vec![Sums::default(); pixels as usize];
+    let mut batch_sums = vec![[Vec3::ZERO; BATCHES as usize]; pixels as usize];
+    // The first surfaces of each batch, and their stratum.
+    let mut first: [Option<(u32, Vec<Surface>)>; BATCHES as usize] = Default::default();
     for sample_index in samples.clone() {
         let step = step(inputs, sample_index, rows.clone(), samples.clone());
+        let of_each = || (0..pixels).into_par_iter();
         let batch = random::batch(sample_index) as usize;
         let stratum = random::stratum(&inputs.features, sample_index);
-        let surface = match first[batch] {
-            Some((known, surface)) if known == stratum => surface,
-            _ => primary::primary(inputs, &step, index),
+        if first[batch].as_ref().is_none_or(|(known, _)| *known != stratum) {
+            first[batch] = Some((stratum, of_each().map(|index| primary::primary(inputs, &step, index)).collect()));
+        }
+        let (_, surfaces) = first[batch].as_ref().expect("traced above");
+        let probe = |index| sample::sample(inputs, &step, index, &surfaces[index as usize]);
+        let probes: Vec<Probe> = of_each().map(probe).collect();
+        let hit = |index| {
+            let (surface, probe) = (&surfaces[index as usize], &probes[index as usize]);
+            let hits = reproject::reproject(inputs, &step, index, surface, probe);
+            if inputs.features.reuse == 0 {
+                return hits;
+            }
+            let lit = reuse::light(inputs, &step, index, &reuse::Stage { surfaces, probes: &probes }, &hits);
+            let (delta, light) = lit.unwrap_or_default();
+            Hits { delta: delta.as_vec3(), light: light.as_vec3(), ..hits }
         };
-        first[batch] = Some((stratum, surface));
-        let probe = sample::sample(inputs, &step, index, &surface);
-        let hits = reproject::reproject(inputs, &step, index, &surface, &probe);
-        let subsurface = accumulate::accumulate(inputs, &step, index, &surface, &probe, &hits);
-        subsurface.add_subsurface(&step, &surface, &mut sums, &mut batch_sums[batch]);
-        let reflection = reflect::reflect(inputs, &step, index, &surface);
-        reflection.add_reflection(&mut sums, &mut Vec3::ZERO.clone());
-        sums.samples += 1;
-        let once = single::single(inputs, &step, index, &surface);
-        once.add_single(&mut sums, &mut batch_sums[batch]);
+        let hits: Vec<Hits> = of_each().map(hit).collect();
+        let stage = reuse::Stage { surfaces, probes: &probes };
+        let add = |(index, (sums, batch_sums)): (usize, (&mut Sums, &mut [Vec3; BATCHES as usize]))| {
+            let (surface, i) = (&surfaces[index], index as u32);
+            let own = accumulate::accumulate(inputs, &step, i, surface, &probes[index], &hits[index]);
+            own.add_subsurface(&step, surface, sums, &mut batch_sums[batch]);
+            if inputs.features.reuse != 0 {
+                reuse::reuse(inputs, &step, i, &stage, &hits).add_single(sums, &mut batch_sums[batch]);
+            }
+            let reflection = reflect::reflect(inputs, &step, i, surface);
+            reflection.add_reflection(sums, &mut Vec3::ZERO.clone());
+            sums.samples += 1;
+            single::single(inputs, &step, i, surface).add_single(sums, &mut batch_sums[batch]);
+        };
+        all.par_iter_mut().zip(&mut batch_sums).enumerate().for_each(add);
     }
     let step = step(inputs, samples.start, rows, samples);
-    resolve::resolve(&inputs.features, &step, &sums, &batch_sums)
+    let both = all.iter().zip(&batch_sums);
+    both.map(|(sums, of_batches)| resolve::resolve(&inputs.features, &step, sums, of_batches)).collect()
 }

@@ -8,7 +8,7 @@
 //! normals, the cosine (opaque matter), the environment's image. What emits is also found by points drawn on it; see
 //! [`emitter`](super::emitter).
 
-use super::accumulate::{direction_point, from_direction, from_emitter, lifted, visibility};
+use super::accumulate::{from_direction, from_emitter, lifted, visibility};
 use super::boundary::{ggx, schlick, smith_g2, visible_normal, visible_normal_pdf};
 use super::light::{self, FAR};
 use super::math::{basis, cosine_direction, from_local};
@@ -16,6 +16,7 @@ use super::pixel::position;
 use super::primary::camera_ray;
 use super::projection::{Seen, material, seen};
 use super::sums::Contribution;
+use super::tile::{Place, direction_point};
 use super::{Inputs, boundary, emitter, intersect, texture};
 use crate::shared::{
     DIM_EMITTER_REFLECT, DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Surface, TRANSLUCENT,
@@ -63,7 +64,7 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
         let (u1, u2) = direction_point(
             inputs,
             step,
-            position(inputs.view, step, index),
+            Place::alone(position(inputs.view, step, index)),
             k - inputs.view.light_count,
             DIM_EMITTER_REFLECT,
         );
@@ -88,7 +89,7 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
         };
         return reflectance * arriving;
     }
-    let (u1, u2) = direction_point(inputs, step, position(inputs.view, step, index), j, DIM_REFLECT);
+    let (u1, u2) = direction_point(inputs, step, Place::alone(position(inputs.view, step, index)), j, DIM_REFLECT);
     let wi = lobe.direction(inputs, u1, u2);
     let pdf = lobe.direction_pdf(inputs, wi);
     let cosine = cosine(wi);

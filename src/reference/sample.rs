@@ -5,13 +5,13 @@
 //! region for every technique, as the balance heuristic requires. `camera` draws it from
 //! sigma e^(-sigma r) / (2 pi r) with the one rate `camera_rate`, and follows the camera ray from the eye.
 
-use super::pixel::position;
 use super::profile::{self, Matter, draw_radius};
 use super::projection::{CAMERA, fractions, matter_at, seen};
-use super::random::{batch, key, scramble, unit};
+use super::tile::{Place, coordinate};
 use super::{Inputs, mixture};
 use crate::shared::{
-    DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, PROJECTION_CAMERA, Probe, Step, Surface, TRANSLUCENT,
+    DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, MODEL_TABLE, PROJECTION_CAMERA, Probe, Step, Surface,
+    TRANSLUCENT,
 };
 use std::f64::consts::TAU;
 
@@ -19,15 +19,19 @@ use std::f64::consts::TAU;
 const UNBOUNDED: f64 = profile::UNBOUNDED as f64;
 
 /// No probe: an empty interval.
-pub const NONE: Probe =
-    Probe { offset: glam::Vec3::ZERO, direction: glam::Vec3::ZERO, t_min: 1.0, t_max: 0.0, radius: 0.0 };
-
-/// Coordinate `dimension` (one of the estimator's) of the step's sample at pixel `index`.
-pub fn coordinate(inputs: &Inputs, step: &Step, index: u32, dimension: u32) -> f64 {
-    let (px, py) = position(inputs.view, step, index);
-    let key = key(inputs.view.seed, px, py, batch(step.sample_index), dimension);
-    unit(scramble(step.point[dimension as usize], key))
-}
+pub const NONE: Probe = Probe {
+    offset: glam::Vec3::ZERO,
+    direction: glam::Vec3::ZERO,
+    t_min: 1.0,
+    t_max: 0.0,
+    radius: 0.0,
+    stamp: 0,
+    group: 0,
+    table_node: 0,
+    table_weight: 1.0,
+    table_bend: glam::Vec2::ZERO,
+    table_scale: 0.0,
+};
 
 /// The probe of pixel `index` of the band, whose first surface is `surface`.
 pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Probe {
@@ -40,7 +44,8 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
         return NONE;
     }
     let seen = seen(inputs, surface);
-    let u = |dimension| coordinate(inputs, step, index, dimension);
+    let place = Place::of(inputs, step, index);
+    let u = |dimension| coordinate(inputs, step, place, dimension);
     let (material, u_component) = mixture::pick(&members, u(DIM_COMPONENT));
     let given = inputs.features.projection == PROJECTION_CAMERA;
 
@@ -63,13 +68,23 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
     let offset = r * (cos * x + sin * y);
     let direction = if technique == CAMERA { (offset * seen.inverse_distance - seen.wo).normalize() } else { axis };
 
+    let mut none = NONE;
+    if inputs.features.reuse != 0 {
+        none.stamp = step.sample_index + 1;
+        none.group = 2 * inputs.triangles[surface.triangle as usize].set + u32::from(seen.side < 0.0);
+        if matter.material.model == MODEL_TABLE {
+            let placement = profile::table::placement(matter);
+            (none.table_node, none.table_weight) = (placement.node, placement.weight as f32);
+            (none.table_bend, none.table_scale) = (placement.bend.as_vec2(), placement.scale as f32);
+        }
+    }
     let (mut t_min, mut t_max) = (-UNBOUNDED, UNBOUNDED);
     if !given && material.radius_max < profile::UNBOUNDED {
         let radius = f64::from(material.radius_max);
         let middle = -offset.dot(direction);
         let half = middle * middle - (offset.length_squared() - radius * radius);
         if half < 0.0 {
-            return NONE;
+            return none;
         }
         (t_min, t_max) = (middle - half.sqrt(), middle + half.sqrt());
     }
@@ -87,6 +102,7 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
         t_min: t_min as f32,
         t_max: t_max as f32,
         radius: r as f32,
+        ..none
     }
 }
 

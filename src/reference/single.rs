@@ -43,7 +43,7 @@
 //! distribution function inverted, 1 - cos = (1 - g) (1 - u) / b ((1 - g)(1 + g) / b + 1 - g), b = 1 - g + 2 g u; for
 //! g < 0, |g| and the opposite direction.
 
-use super::accumulate::{direction_point, lifted, tint, visibility};
+use super::accumulate::{lifted, tint, visibility};
 use super::light::{self, FAR};
 use super::math::from_local;
 use super::pixel::position;
@@ -52,6 +52,7 @@ use super::random::{batch, key, scramble, unit};
 use super::rough::crossing;
 use super::sums::Contribution;
 use super::texture;
+use super::tile::{Place, direction_point};
 use super::{Inputs, emitter, intersect, mixture};
 use crate::shared::{
     DIM_SINGLE, DIM_SINGLE_EMITTER, DIM_SINGLE_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, MISS, Material, SHADOW_OFFSET,
@@ -239,7 +240,7 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
             let (u1, u2) = direction_point(
                 inputs,
                 step,
-                position(inputs.view, step, index),
+                Place::alone(position(inputs.view, step, index)),
                 k - inputs.view.light_count,
                 DIM_SINGLE_EMITTER,
             );
@@ -251,8 +252,13 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
             let density = drawn.density + direction_pdf(inputs, &directions, drawn.wi);
             return (!hidden).then(|| part * drawn.radiance / (density * each));
         }
-        let u =
-            direction_point(inputs, step, position(inputs.view, step, index), k - first_direction, DIM_SINGLE_LIGHT);
+        let u = direction_point(
+            inputs,
+            step,
+            Place::alone(position(inputs.view, step, index)),
+            k - first_direction,
+            DIM_SINGLE_LIGHT,
+        );
         let wi = direction(inputs, &directions, u)?;
         let pdf = direction_pdf(inputs, &directions, wi);
         let (part, exit, along) = passage(wi, FAR, MISS)?;

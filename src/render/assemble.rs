@@ -76,12 +76,23 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     } else {
         Counts { begin: range.start, end: range.end, mean: range.end - range.start }
     };
+    let [x0, y0, x1, y1] = renderer.prepared.shown;
+    let mut channels = channels.list;
+    if count != ((x1 - x0) * (y1 - y0)) as usize {
+        let width = view.crop_width as usize;
+        let columns = (x0 - view.crop_x) as usize..(x1 - view.crop_x) as usize;
+        let shown = (y0 - rows.start) as usize..(y1 - rows.start) as usize;
+        for channel in &mut channels {
+            let of_row = |row| &channel.data[row * width..][columns.clone()];
+            channel.data = shown.clone().flat_map(of_row).copied().collect();
+        }
+    }
     Ok(Image {
-        width: view.crop_width,
-        height: rows.end - rows.start,
-        origin: (view.crop_x, rows.start),
+        width: x1 - x0,
+        height: y1 - y0,
+        origin: (x0, y0),
         full: (view.width, view.height),
-        channels: channels.list,
+        channels,
         attributes: attributes(renderer, &counts, invalid, has_variance),
     })
 }
@@ -220,6 +231,7 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
             let Cloud { points, opening, samples } = settings.cloud;
             serde_json::json!([points, opening, samples])
         }),
+        "reuse": settings.reuse,
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
         "model": settings.model.to_string(),

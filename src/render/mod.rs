@@ -68,7 +68,9 @@ macro_rules! kernels {
             &[$((stringify!($stem), include_bytes!(concat!(env!("OUT_DIR"), "/", stringify!($stem), ".spv"))),)*];
     };
 }
-kernels!(begin, irradiance, cluster, primary, sample, reproject, accumulate, gather, reflect, single, count, resolve);
+kernels!(
+    begin, irradiance, cluster, primary, sample, reproject, accumulate, reuse, gather, reflect, single, count, resolve
+);
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -405,6 +407,10 @@ impl Renderer {
             let actives = find(&self.buffers, Slot::Actives).expect("kernels work on lists");
             let base = Step { first_row, pixel_count: pixels, traced, ..Step::default() };
             let whole = Extent::Invocations(listed.unwrap_or(pixels));
+            if prepared.features.reuse != 0 {
+                // Stamps of other bands, and of sums that are forgotten, mean nothing here.
+                recorder.fill(find(&self.buffers, Slot::Probes).expect("tiles have probes"), 0);
+            }
             for sample_index in samples.clone() {
                 let step = Step { sample_index, point: random::point(sample_index), ..base };
                 let stratum = Some(random::stratum(&prepared.features, sample_index));
@@ -510,6 +516,7 @@ impl Kernels {
             }
             step.first = 0;
         }
+        dispatch(&self.reuse, &step);
         for begin in (0..prepared.ray_count).step_by(MAX_SINGLE as usize) {
             step.ray_begin = begin;
             step.ray_count = (prepared.ray_count - begin).min(MAX_SINGLE);

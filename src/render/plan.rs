@@ -140,6 +140,10 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
             true => (true, "a translucent surface is in the opaque limit"),
             false => (false, "no surface is translucent"),
         },
+        "reuse" => match prepared.features.reuse != 0 {
+            true => (true, "pixels of a tile share the hits that they light"),
+            false => (false, "no hits are shared between pixels"),
+        },
         "single" => match prepared.has_single && prepared.ray_count > 0 {
             true => (true, "a model leaves out light that was scattered once"),
             false => (false, "no model needs light that was scattered once, or there is no light"),

@@ -180,6 +180,8 @@ constants! {
     DIM_SINGLE_LIGHT: u32 = 18;
     /// Dimensions 20 and 21: point of an emitter for that point (a point per direction).
     DIM_SINGLE_EMITTER: u32 = 20;
+    /// Added to a dimension for what the place in a tile brings to it.
+    DIM_PLACE: u32 = 32;
 
     /// Of `functions`: x y + z, x / y and sqrt |x|, for what the device's arithmetic is.
     FUNCTION_ARITHMETIC: u32 = 0;
@@ -602,6 +604,16 @@ structs! {
         t_max: f32,
         /// Camera projection only: radius in the tangent plane.
         radius: f32,
+        /// Tiles only: 1 + the sample to which the following belongs, also where it has no probe; 0 for none.
+        stamp: u32,
+        /// 2 x the set, and 1 where its inner side is seen: pixels that have the same share hits.
+        group: u32,
+        /// Tabulated profile at the surface that is seen: the first of two curvatures, its weight, how distances bend for
+        /// both, and 1/4a^2.
+        table_node: u32,
+        table_weight: f32,
+        table_bend: Vec2,
+        table_scale: f32,
     }
 
     /// Where a probe meets surfaces of its set, written by `reproject`.
@@ -610,6 +622,9 @@ structs! {
         count: u32,
         t: [f32; 8],
         triangle: [u32; 8],
+        /// Tiles only, written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
+        delta: Vec3,
+        light: Vec3,
     }
 
     /// Running sums of a pixel, compensated: the true sum is `x + x_carry` (Neumaier / TwoSum).
@@ -731,6 +746,8 @@ features! {
     mixtures = 11: MIXED,
     /// One of INTEGRATOR_*.
     integrator = 12: INTEGRATOR,
+    /// Width of the tiles in which pixels share their lit hits, a power of 2; 0 where they do not.
+    reuse = 13: REUSE,
 }
 
 impl Features {

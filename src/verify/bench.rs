@@ -28,6 +28,7 @@ const EVERYTHING: Features = Features {
     recorded: 0,
     listed: 0,
     mixtures: 0,
+    reuse: 0,
     integrator: INTEGRATOR_SAMPLE,
 };
 

@@ -94,6 +94,7 @@ fn settings(seed: u32) -> Settings {
         directions: 2,
         seed,
         show_environment: true,
+        reuse: 1,
         single_scattering: SingleScattering::Off,
         ..Settings::default()
     }
@@ -140,6 +141,7 @@ pub fn cases() -> Result<Vec<Case>> {
         cases.push(Case::new(name, scene, &settings)?);
     }
     cases.push(mixed()?);
+    cases.extend(tiled()?);
     Ok(cases)
 }
 
@@ -175,6 +177,22 @@ fn mixed() -> Result<Case> {
         set.materials = members;
     }
     Case::new("three media, mis, delta lights", scene, &settings(12))
+}
+
+/// Scenes in which pixels of tiles share hits.
+fn tiled() -> Result<Vec<Case>> {
+    let list = [
+        ("standard, tiles of 4, delta lights", Model::Standard, Light::Delta, 4),
+        ("table, tiles of 8, image", Model::Table, Light::Image, 8),
+    ];
+    let mut cases = vec![];
+    for (seed, (name, model, light, reuse)) in (23..).zip(list) {
+        let mut materials = materials();
+        materials[0]["extras"]["bssrdf"]["ior"] = json!(1.3);
+        let scene = still_life(&materials, light)?;
+        cases.push(Case::new(name, scene, &Settings { model, reuse, ..settings(seed) })?);
+    }
+    Ok(cases)
 }
 
 /// Scenes whose light is gathered: models, lights, a rough boundary.

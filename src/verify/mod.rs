@@ -169,6 +169,7 @@ tests! {
     "kernel.sample" ["sample"] |context| stages::each(context, stages::sample);
     "kernel.reproject" ["reproject"] |context| stages::each(context, stages::reproject);
     "kernel.accumulate" ["accumulate"] |context| stages::each(context, stages::accumulate);
+    "kernel.reuse" ["reuse"] |context| stages::each(context, stages::reuse);
     "kernel.gather" ["gather"] cloud::gather;
     "kernel.single" ["single"] |context| stages::each(context, stages::single);
     "kernel.reflect" ["reflect"] |context| stages::each(context, stages::reflect);

@@ -4,10 +4,20 @@ use super::{Bound, Case, Context, Loaded, ROUNDING, Roundings, Verdict, World, r
 use crate::{
     error::Result,
     reference::{
-        self, accumulate::accumulate as twin_accumulate, begin::begin as twin_begin, count::count as twin_count,
-        primary::primary as twin_primary, random, reflect::reflect as twin_reflect,
-        reproject::reproject as twin_reproject, resolve::resolve as twin_resolve, sample::sample as twin_sample,
-        single::single as twin_single, strict, sums::Contribution,
+        self,
+        accumulate::accumulate as twin_accumulate,
+        begin::begin as twin_begin,
+        count::count as twin_count,
+        primary::primary as twin_primary,
+        random,
+        reflect::reflect as twin_reflect,
+        reproject::reproject as twin_reproject,
+        resolve::resolve as twin_resolve,
+        reuse::{Stage, light, reuse as twin_reuse},
+        sample::sample as twin_sample,
+        single::single as twin_single,
+        strict,
+        sums::Contribution,
     },
     shared::*,
 };
@@ -32,6 +42,8 @@ pub struct Staged {
     pub surfaces: Vec<Surface>,
     pub probes: Vec<Probe>,
     pub hits: Vec<Hits>,
+    /// What `accumulate` leaves for the pixels of a tile.
+    pub lit: Vec<Option<(DVec3, DVec3)>>,
 }
 
 impl Staged {
@@ -43,8 +55,11 @@ impl Staged {
         let surfaces: Vec<_> = pixels().map(|i| twin_primary(&inputs, &step, i)).collect();
         let probes: Vec<_> = pixels().map(|i| twin_sample(&inputs, &step, i, &surfaces[i as usize])).collect();
         let hits = pixels().map(|i| twin_reproject(&inputs, &step, i, &surfaces[i as usize], &probes[i as usize]));
-        let hits = hits.collect();
-        Staged { step, surfaces, probes, hits, case }
+        let hits: Vec<Hits> = hits.collect();
+        let stage = Stage { surfaces: &surfaces, probes: &probes };
+        let lit = pixels().map(|i| light(&inputs, &step, i, &stage, &hits[i as usize]));
+        let lit = if inputs.features.reuse == 0 { vec![None; hits.len()] } else { lit.collect() };
+        Staged { step, surfaces, probes, hits, lit, case }
     }
 
     /// Where the surfaces and sums of the step's batch are among those of all batches.
@@ -64,15 +79,22 @@ impl Staged {
         context.bench.run(stem, &self.case.inputs(), &self.case.scene.nodes, &self.step, buffers)
     }
 
-    /// The sums that a kernel adds to, which were zero, and those of the step's batch.
-    fn run_sums(&self, context: &mut Context, stem: &'static str) -> Result<(Vec<Sums>, Vec<Vec3>)> {
+    /// The sums that a kernel adds to, which were zero, those of the step's batch, and the hits it leaves.
+    fn run_sums(&self, context: &mut Context, stem: &'static str) -> Result<(Vec<Sums>, Vec<Vec3>, Vec<Hits>)> {
         let surfaces = self.g_buffers();
         let sums = vec![Sums::default(); self.surfaces.len()];
         let batch_sums = vec![Vec3::ZERO; self.surfaces.len() * BATCHES as usize];
         // A pixel without a probe has no hits, whatever its list says.
         let lists = self.hits.iter().zip(&self.probes);
-        let hits: Vec<Hits> =
-            lists.map(|(hits, probe)| if probe.t_min <= probe.t_max { *hits } else { STALE }).collect();
+        let lit = self.lit.iter().map(|lit| lit.unwrap_or_default());
+        let left = |((hits, probe), (delta, light)): ((&Hits, &Probe), (DVec3, DVec3))| {
+            let hits = if probe.t_min <= probe.t_max { *hits } else { STALE };
+            match stem {
+                "reuse" => Hits { delta: delta.as_vec3(), light: light.as_vec3(), ..hits },
+                _ => Hits { delta: STALE.delta, light: STALE.light, ..hits },
+            }
+        };
+        let hits: Vec<Hits> = lists.zip(lit).map(left).collect();
         let buffers: [(Slot, &[u8]); 5] = [
             (Slot::Surfaces, bytemuck::cast_slice(&surfaces)),
             (Slot::Probes, bytemuck::cast_slice(&self.probes)),
@@ -82,7 +104,8 @@ impl Staged {
         ];
         let loaded = self.run(context, stem, &buffers)?;
         let batch = context.bench.read::<Vec3>(&loaded, Slot::BatchSums)?;
-        Ok((context.bench.read(&loaded, Slot::RunningSums)?, batch[self.batch()].to_vec()))
+        let hits = context.bench.read(&loaded, Slot::HitLists)?;
+        Ok((context.bench.read(&loaded, Slot::RunningSums)?, batch[self.batch()].to_vec(), hits))
     }
 
     /// What a twin adds to each pixel.
@@ -92,7 +115,7 @@ impl Staged {
 }
 
 /// What an earlier sample may have left: hits of triangles that do not exist.
-const STALE: Hits = Hits { count: 99, t: [1.0; 8], triangle: [MISS; 8] };
+const STALE: Hits = Hits { count: 99, t: [1.0; 8], triangle: [MISS; 8], delta: Vec3::ONE, light: Vec3::ONE };
 
 /// A kernel on all cases of this program.
 ///
@@ -209,6 +232,12 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         for (i, (found, twin)) in found.iter().zip(&staged.probes).enumerate() {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
             let exists = |p: &Probe| p.t_min <= p.t_max;
+            verdict.words(found.stamp, twin.stamp, || at("stamp"));
+            verdict.words(found.group, twin.group, || at("group"));
+            verdict.words(found.table_node, twin.table_node, || at("node"));
+            verdict.compare(found.table_weight, twin.table_weight.into(), 1.0, || at("weight"));
+            let bend = twin.table_bend.as_dvec2().extend(twin.table_scale.into());
+            verdict.vector(found.table_bend.extend(found.table_scale), bend, 1.0, || at("bend"));
             verdict.words(u32::from(exists(found)), u32::from(exists(twin)), || at("probe"));
             if !exists(twin) || !exists(found) {
                 continue;
@@ -292,7 +321,7 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     let mut lit = 0;
     for staged in staged {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());
-        let (sums, batch) = staged.run_sums(context, "accumulate")?;
+        let (sums, batch, hits) = staged.run_sums(context, "accumulate")?;
         let twins = staged.contributions(|i| {
             let at = i as usize;
             let (surface, probe, hits) = (&staged.surfaces[at], &staged.probes[at], &staged.hits[at]);
@@ -309,8 +338,52 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
                 verdict.vector(sums.subsurface, twin.radiance, twin.radiance.length(), at);
             }
         }
+        if inputs.features.reuse == 0 {
+            continue;
+        }
+        for (i, (found, twin)) in hits.iter().zip(&staged.lit).enumerate() {
+            let at = |what: &str| format!("{name}, pixel {i}, {what}");
+            verdict.words(u32::from(found.light != Vec3::ZERO), twin.is_some().into(), || at("lit"));
+            if let Some((delta, light)) = twin {
+                lit += 1;
+                verdict.vector(found.delta, *delta, delta.length().max(1.0), || at("place"));
+                verdict.vector(found.light, *light, light.length(), || at("light"));
+            }
+        }
     }
     verdict.require(lit > 100 * staged.len(), || format!("only {lit} samples are lit"));
+    Ok(verdict)
+}
+
+/// Light of a tile's hits.
+///
+/// # Errors
+/// As [`super::Test::run`].
+pub fn reuse(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
+    let mut verdict = Verdict::new(Bound::Relative(SHADING));
+    let mut lit = 0;
+    for staged in staged.iter().filter(|staged| staged.case.prepared.features.reuse != 0) {
+        let (name, inputs) = (&staged.case.name, staged.case.inputs());
+        let (sums, batch, _) = staged.run_sums(context, "reuse")?;
+        let of_twin = |lit: &Option<(DVec3, DVec3)>| {
+            let (delta, light) = lit.unwrap_or_default();
+            Hits { delta: delta.as_vec3(), light: light.as_vec3(), ..Hits::default() }
+        };
+        let hits: Vec<Hits> = staged.lit.iter().map(of_twin).collect();
+        let stage = Stage { surfaces: &staged.surfaces, probes: &staged.probes };
+        let twins = staged.contributions(|i| twin_reuse(&inputs, &staged.step, i, &stage, &hits));
+        for (i, (sums, twin)) in sums.iter().zip(&twins).enumerate() {
+            let at = || format!("{name}, pixel {i}");
+            let counts = (sums.samples, sums.covered, sums.invalid);
+            verdict.require(counts == (0, 0, u32::from(twin.invalid)), || format!("{}: {counts:?}", at()));
+            verdict.require(batch[i] == sums.subsurface, || format!("{}: the batch's sum is another", at()));
+            if twin.radiance != DVec3::ZERO || sums.subsurface != Vec3::ZERO {
+                lit += 1;
+                verdict.vector(sums.subsurface, twin.radiance, twin.radiance.length(), at);
+            }
+        }
+    }
+    verdict.require(lit > 200, || format!("only {lit} pixels are lit"));
     Ok(verdict)
 }
 
@@ -324,7 +397,7 @@ pub fn single(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     let mut lit = 0;
     for staged in staged.iter().filter(|staged| staged.case.prepared.has_single) {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());
-        let (sums, batch) = staged.run_sums(context, "single")?;
+        let (sums, batch, _) = staged.run_sums(context, "single")?;
         let twins = staged.contributions(|i| twin_single(&inputs, &staged.step, i, &staged.surfaces[i as usize]));
         // An exponential of many mean free paths, or of a way that grazes the surface, has lost digits; what it leaves is
         // little beside the mean.
@@ -360,7 +433,7 @@ pub fn reflect(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     let mut lit = 0;
     for staged in staged {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());
-        let (sums, _) = staged.run_sums(context, "reflect")?;
+        let (sums, ..) = staged.run_sums(context, "reflect")?;
         let twins = staged.contributions(|i| twin_reflect(&inputs, &staged.step, i, &staged.surfaces[i as usize]));
         for (i, (sums, twin)) in sums.iter().zip(&twins).enumerate() {
             let at = || format!("{name}, pixel {i}");

@@ -93,6 +93,7 @@ impl Experiment {
                 projection,
                 model: self.model,
                 single_scattering: SingleScattering::Off,
+                reuse: 1,
                 ..Settings::default()
             };
             let image = render(&scene, &settings, 256);

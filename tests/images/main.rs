@@ -18,6 +18,7 @@ mod mixtures;
 #[path = "../common/pool.rs"]
 mod pool;
 mod repeatable;
+mod reuse;
 mod scenes;
 mod single;
 mod statistics;

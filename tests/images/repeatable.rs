@@ -46,6 +46,13 @@ fn two_runs_bands_portions_and_workgroups_give_the_same_bits() {
         let settings = Settings { workgroup, ..settings() };
         assert_same(&whole, &image(&settings, &[3..27]), &format!("workgroups of {workgroup}"));
     }
+    // Tiles end at the edge of a band, and nowhere else.
+    let tiles = Settings { reuse: 8, ..settings() };
+    let whole = image(&tiles, &[3..27]);
+    assert_same(&whole, &image(&tiles, &[3..4, 4..20, 20..27]), "tiles in portions");
+    assert_same(&whole, &image(&Settings { workgroup: 32, ..tiles.clone() }, &[3..27]), "tiles by other workgroups");
+    let bands = image(&Settings { band_pixels: Some(500), ..tiles }, &[3..27]);
+    assert_ne!(channel(&whole, "subsurface.R"), channel(&bands, "subsurface.R"));
 }
 
 #[test]
@@ -78,9 +85,15 @@ fn image_in_the_middle_changes_nothing() {
 
 #[test]
 fn crop_is_a_part_of_the_whole() {
-    let whole = image(&settings(), &[0..8]);
+    for reuse in [1, 4, 8] {
+        crop_is_a_part(&Settings { reuse, ..settings() });
+    }
+}
+
+fn crop_is_a_part(settings: &Settings) {
+    let whole = image(settings, &[0..8]);
     let [x0, y0, x1, y1] = [20, 10, 45, 33];
-    let part = image(&Settings { crop: Some([x0, y0, x1, y1]), ..settings() }, &[0..8]);
+    let part = image(&Settings { crop: Some([x0, y0, x1, y1]), ..settings.clone() }, &[0..8]);
     assert_eq!((part.width, part.height, part.origin, part.full), (x1 - x0, y1 - y0, (x0, y0), (60, 44)));
     for name in ["R", "subsurface.G", "A", "P.Z", "variance.B"] {
         for y in y0..y1 {

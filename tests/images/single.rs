@@ -27,8 +27,14 @@ fn a_plane_follows_lommel_and_seeliger() {
             scene(&gltf(&[(slab.clone(), 0)], &[matter(albedo, albedo.map(|a| 1.0 - a), 1.0)], &lights, &eye_at));
         let [with, without] = [SingleScattering::On, SingleScattering::Off].map(|single_scattering| {
             let model = Model::Standard;
-            let settings =
-                Settings { resolution: Some((8, 8)), seed: 3, model, single_scattering, ..Settings::default() };
+            let settings = Settings {
+                resolution: Some((8, 8)),
+                seed: 3,
+                model,
+                single_scattering,
+                reuse: 1,
+                ..Settings::default()
+            };
             render(&scene, &settings, 128)
         });
         let (mu0, mu) = (light.to_radians().cos(), eye.to_radians().cos());

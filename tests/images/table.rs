@@ -9,7 +9,7 @@ use glam::DVec3;
 use translucent::{Model, Projection, Scene, Settings, reference::boundary::transmittance, scene::Environment};
 
 fn settings(size: u32) -> Settings {
-    Settings { resolution: Some((size, size)), seed: 5, model: Model::Table, ..Settings::default() }
+    Settings { resolution: Some((size, size)), seed: 5, model: Model::Table, reuse: 1, ..Settings::default() }
 }
 
 fn uniform(mut scene: Scene) -> Scene {

@@ -43,6 +43,7 @@ fn probes(inputs: &Inputs) -> (Vec<Surface>, Vec<Probe>) {
             t_min: -5.0,
             t_max: 5.0,
             radius: 0.0,
+            ..Probe::default()
         };
         (surface, probe)
     };

@@ -96,6 +96,17 @@ mutants! {
     "primary.comp", "lost condition", "kernel.primary": "surface.triangle != MISS || " => "";
     "pixel.glsl", "index", "kernel.primary": "return batch * step_.pixel_count + index;" =>
         "return (batch + 1u) % BATCHES * step_.pixel_count + index;";
+    "tile.glsl", "index", "kernel.sample": "pixel.y % REUSE * REUSE + pixel.x % REUSE" =>
+        "pixel.x % REUSE * REUSE + pixel.y % REUSE";
+    "tile.glsl", "lost term", "kernel.sample": "v ^= place_coordinate(" => "v += 0u * place_coordinate(";
+    "tile.glsl", "off by one", "kernel.accumulate": "clamp(corner + int(REUSE), ivec2(0), size)" =>
+        "clamp(corner + int(REUSE) - 1, ivec2(0), size)";
+    "sample.comp", "lost factor", "kernel.sample": "2u * triangles[surface.triangle].set" => "triangles[surface.triangle].set";
+    "shared_hit.glsl", "lost condition", "kernel.accumulate": " && probes[index].group == group" => "";
+    "shared_hit.glsl", "sign", "kernel.accumulate": "hit - surfaces[surface_index(other)].position + delta" =>
+        "hit - surfaces[surface_index(other)].position - delta";
+    "accumulate.comp", "lost condition", "kernel.accumulate": "REUSE != 0u && step_.ray_begin == 0u" => "REUSE == 0u";
+    "reuse.comp", "index", "kernel.reuse": "surface.position + hit_lists[other].delta" => "surface.position + hit_lists[index].delta";
     "sample.comp", "sign", "kernel.sample": "probe.t_max = -b + half_chord;" => "probe.t_max = b + half_chord;";
     "sample.comp", "swapped branch", "kernel.sample":
         "technique == TECHNIQUE_U ? tangent : bitangent" => "technique == TECHNIQUE_U ? bitangent : tangent";

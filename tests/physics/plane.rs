@@ -159,8 +159,14 @@ fn light_below_the_geometric_horizon_counts_nothing() {
     (s.normal0, s.normal1, s.normal2) = (leaning, leaning, leaning);
     world.look(DVec3::Z * 5.0, DVec3::ZERO, 1e-3);
     let surface = world.surface(0, DVec3::ZERO);
-    let probe =
-        Probe { offset: (at + DVec3::Z).as_vec3(), direction: -glam::Vec3::Z, t_min: -10.0, t_max: 10.0, radius: 3.0 };
+    let probe = Probe {
+        offset: (at + DVec3::Z).as_vec3(),
+        direction: -glam::Vec3::Z,
+        t_min: -10.0,
+        t_max: 10.0,
+        radius: 3.0,
+        ..Probe::default()
+    };
     let mut hits = Hits { count: 1, ..Default::default() };
     (hits.t[0], hits.triangle[0]) = (1.0, 1);
     for (height, lit) in [(0.05, true), (-0.05, false)] {

@@ -98,6 +98,7 @@ fn the_trace_opens_is_nested_and_names_what_ran() {
         ("reflect", 9),
         ("reproject", 9),
         ("resolve", 1),
+        ("reuse", 9),
         ("sample", 9),
     ];
     assert_eq!(counts.iter().map(|(name, (count, _))| (*name, *count)).collect::<Vec<_>>(), expected);

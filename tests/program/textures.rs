@@ -87,7 +87,7 @@ fn the_albedo_mapping_says_what_a_scattering_colour_is() {
     assert!(drafts < 0.75 * colour, "the two differ");
     for (options, total) in [("", drafts), (" --albedo-mapping gltf", drafts), (" --albedo-mapping surface", colour)] {
         let render = "render scene.gltf --model standard --single-scattering off --environment constant:1,1,1 \
-            --resolution 4x4 --samples 256 --quiet -o out.exr";
+            --resolution 4x4 --reuse 1 --samples 256 --quiet -o out.exr";
         folder.done(&format!("{render}{options}"));
         let image = folder.image("out.exr");
         let values: Vec<f64> = image.channel("subsurface.G").expect("light").iter().map(|x| f64::from(*x)).collect();

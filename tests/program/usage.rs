@@ -153,6 +153,7 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
             "--renormalise",
             "--reproject",
             "--resolution",
+            "--reuse",
             "--samples",
             "--seed",
             "--show-environment",

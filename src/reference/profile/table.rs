@@ -22,7 +22,7 @@ use crate::table::{
     block::{Block, HEADER},
     grid,
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// The profile of one channel on a half-space.
@@ -206,6 +206,27 @@ fn parts(matter: Matter) -> Vec<Part> {
     let weight = (curvature - low) / (of(above - 1) - low);
     let part = |node: usize, weight| Part { node, weight, bend: bend(node), scale };
     vec![part(above - 1, weight), part(above, 1.0 - weight)]
+}
+
+/// Where a curvature lies between a table's nodes, as kernels keep it: the first of two nodes, its weight, how distances
+/// bend in both, and 1 / 4 a^2.
+pub struct Placement {
+    pub node: u32,
+    pub weight: f64,
+    pub bend: DVec2,
+    pub scale: f64,
+}
+
+/// Of the matter's curvature.
+pub fn placement(matter: Matter) -> Placement {
+    let parts = parts(matter);
+    let (first, last) = (&parts[0], &parts[parts.len() - 1]);
+    Placement {
+        node: first.node as u32,
+        weight: first.weight,
+        bend: DVec2::new(first.bend, last.bend),
+        scale: first.scale,
+    }
 }
 
 /// shape(r) of the three channels.

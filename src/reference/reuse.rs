@@ -1,0 +1,82 @@
+//! Pixels of a tile share the hits that they light: twin of `reuse.comp`.
+//!
+//! # Estimator
+//! What pixels see that lie side by side differs little, and so do their integrals over the surface: a point that one has
+//! found and lit serves all (P. Bekaert, M. Sbert, J. Halton, "Accelerating path tracing by re-using paths", EGWR 2002).
+//! With f_i(x) the [profile](super::accumulate) of light from x to the point that pixel i sees, F_i its sum over channels,
+//! p_i the density of the hits of i's probes, and E the light that enters, pixel i of a tile T gets from the hits x of all
+//! probes j in T
+//!
+//!   Lo_i ~ Ft(wo) sum over j, x of  m_j(x) f_i(x) / p_j(x) E(x),     m_j(x) = F_j(x) / sum over k in T of F_k(x).
+//!
+//! The weights m_j add up to 1 at each x where any F_k > 0, and p_j > 0 wherever F_j > 0, so the expectation is that of
+//! each pixel alone, whatever the tile. That takes F_j = 0 beyond the ball in which j's probes look, and pixels of one set
+//! that are seen from one side: then the hits of one are hits of the other. One hit of each probe is lit, with the
+//! probability c / C, c = F_j / p_j, C the sum of c over the probe's hits, so that what is added is
+//!
+//!   C E(x) f_i(x) / sum over k of F_k(x):
+//!
+//! each channel is at most C E, which bounds the weight of a hit of a pixel alone too. Where a tile is small beside the
+//! mean free path, all F_k are alike and the variance is that of W^2 probes; where it is large, that of one. The noise of
+//! neighbours goes together: the mean over an area is no better than it was.
+
+use super::Inputs;
+use super::accumulate::{Entry, choose, entering_light, leaving};
+use super::profile::obliqueness;
+use super::projection::{matter_at, seen};
+use super::shared_hit::{sharing, tile_value, value};
+use super::sums::Contribution;
+use super::tile::Place;
+use crate::shared::{Hits, MODEL_LAMBERT, Probe, Step, Surface};
+use glam::DVec3;
+
+/// What the pixels of a band see and probe in a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'a> {
+    /// Of the sample's batch.
+    pub surfaces: &'a [Surface],
+    pub probes: &'a [Probe],
+}
+
+impl Stage<'_> {
+    pub fn position(&self, index: u32) -> DVec3 {
+        self.surfaces[index as usize].position.as_dvec3()
+    }
+}
+
+/// The part of `accumulate.comp`: from the point that pixel `index` sees to the hit that it lights, and that hit's light
+/// over the values of the tile; none where there is no such hit.
+pub fn light(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &Hits) -> Option<(DVec3, DVec3)> {
+    let (surface, probe) = (&stage.surfaces[index as usize], &stage.probes[index as usize]);
+    if probe.stamp != step.sample_index + 1 || step.ray_count == 0 {
+        return None;
+    }
+    let (matter, seen) = (matter_at(inputs, surface), seen(inputs, surface));
+    // f / p with the weight of the choice, and over channels C.
+    let (chosen, weighted) = choose(inputs, step, index, matter, &seen, probe, hits)?;
+    let delta = probe.offset.as_dvec3() + f64::from(hits.t[chosen]) * probe.direction.as_dvec3();
+    let entry = Entry::new(inputs, matter.material, seen.side, seen.position + delta, hits.triangle[chosen]);
+    let value = |wi: DVec3| obliqueness(matter, entry.shading.dot(wi), false);
+    let light = entry.tint * entering_light(inputs, step, Place::of(inputs, step, index), &entry, value);
+    if light == DVec3::ZERO {
+        return None;
+    }
+    Some((delta, light * weighted.element_sum() / tile_value(inputs, step, stage, index, delta)))
+}
+
+/// The contribution of the tile's hits to pixel `index`. Of hits only `delta` and `light` are read.
+pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &[Hits]) -> Contribution {
+    let surface = &stage.surfaces[index as usize];
+    if stage.probes[index as usize].stamp != step.sample_index + 1 {
+        return Contribution::default();
+    }
+    let matter = matter_at(inputs, surface);
+    debug_assert!(matter.material.model != MODEL_LAMBERT, "no probe is drawn in the opaque limit");
+    let of = |other: u32| {
+        let Hits { delta, light, .. } = hits[other as usize];
+        let delta = stage.position(other) - stage.position(index) + delta.as_dvec3();
+        light.as_dvec3() * value(matter, delta, other == index)
+    };
+    let sum: DVec3 = sharing(inputs, step, stage, index).into_iter().map(of).sum();
+    Contribution::of(leaving(inputs, matter, matter, &seen(inputs, surface), surface) * sum)
+}
