@@ -80,8 +80,8 @@ void main() {
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
     if ((m.flags & TRANSLUCENT) == 0u) return;
-    // Of all other matter light is gathered.
-    if (INTEGRATOR == INTEGRATOR_CLOUD && !has_model(m, MODEL_LAMBERT)) return;
+    // Other integrators do the rest.
+    if (INTEGRATOR != INTEGRATOR_SAMPLE && !has_model(m, MODEL_LAMBERT)) return;
     if (MIXED != 0) {
         m.camera_rate = mixture_at(surface).camera_rate;
     } else if (has_model(m, MODEL_TABLE)) {

@@ -56,6 +56,10 @@ const uint MISS = 4294967295u;
 const uint INTEGRATOR_SAMPLE = 0u;
 // Integrator: points on the surface are lit once, and each pixel gathers from them.
 const uint INTEGRATOR_CLOUD = 1u;
+// Integrator: points uniform over the area of the surface, on the host.
+const uint INTEGRATOR_AREA = 2u;
+// Integrator: random walks through the matter, on the host.
+const uint INTEGRATOR_WALK = 3u;
 // Projection: all techniques combined by the balance heuristic.
 const uint PROJECTION_MIS = 0u;
 // Projection: the camera ray alone, first hit, as the method was given.

@@ -43,6 +43,11 @@
 //!   ┌─── when the lights change ───┐               ┌──────── per sample ────────┐
 //!   irradiance      cluster                        gather
 //!   └► Clusters     └► Clusters above them         └► RunningSums, BatchSums
+//!
+//!   Integrator::Area and Integrator::Walk, in place of sample, reproject and accumulate, on the host:
+//!                                                  ┌──────── per sample ────────┐
+//!                                                  Surfaces, RunningSums, BatchSums ◄─ reference::uniform,
+//!                                                                            reference::walk::radiance
 //! ```
 //!
 //! Each word with a capital is a buffer or a struct that [`shared`] defines once for Rust and GLSL. Each kernel is
@@ -84,7 +89,7 @@
 //! | [`timeline`] | nothing | [`timeline::Timeline`]: what takes how long; traces and sums |
 //! | [`settings`] | `shared`, `timeline` | [`Settings`]: what a caller may choose |
 //! | [`scene`] | `shared`, `error`, `settings`, `timeline` | [`Scene`]: files or vertices, rules, geometry, BVH, presets; no Vulkan |
-//! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, and an integrator that shares nothing with them |
+//! | [`mod@reference`] | `shared`, `scene`, `settings` | the kernels' twins, integrators that share nothing with them, and those on the host |
 //! | [`gpu`] | `shared`, `error` | device, buffers, kernels, recorder; all unsafe code; no scenes |
 //! | [`table`] | `reference` | the tabulated profile: its simulation, and tables kept between runs |
 //! | [`model`] | `scene`, `settings` | which profile a material gets |

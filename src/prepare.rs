@@ -1,6 +1,7 @@
 //! A scene and settings become what kernels read: f64 metres in, shared structs in internal units out.
 
 mod cloud;
+mod host;
 mod matter;
 mod sets;
 
@@ -16,7 +17,8 @@ use crate::{
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Scene, Wrap},
     settings::{Directional, Integrator, Projection, Settings},
     shared::{
-        self, Balance, Cluster, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, TRANSLUCENT, Texture, View,
+        self, Balance, Cluster, Coordinates, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, Shading,
+        TRANSLUCENT, Texture, Triangle, View,
     },
 };
 use glam::Vec3;
@@ -58,6 +60,8 @@ pub struct Prepared {
     pub has_translucent: bool,
     /// Whether any of those is not in the opaque limit: otherwise `sample` and `reproject` do not run either.
     pub has_probes: bool,
+    /// Whether the light that comes out of matter is computed on the host; [`Integrator::is_on_host`].
+    pub on_host: bool,
     /// Whether light that was scattered once is added to a material's.
     pub has_single: bool,
     /// Whether light can leave a first surface without having entered it, or the environment is shown: otherwise
@@ -76,11 +80,21 @@ impl Prepared {
 
     /// The buffers as the twins read them.
     pub fn inputs<'a>(&'a self, scene: &'a Scene) -> Inputs<'a> {
+        self.inputs_of(&scene.triangles, &scene.shadings, &scene.coordinates)
+    }
+
+    /// The same with the scene's geometry alone.
+    pub(crate) fn inputs_of<'a>(
+        &'a self,
+        triangles: &'a [Triangle],
+        shadings: &'a [Shading],
+        coordinates: &'a [Coordinates],
+    ) -> Inputs<'a> {
         Inputs {
             features: self.features,
             view: &self.view,
-            triangles: &scene.triangles,
-            shadings: &scene.shadings,
+            triangles,
+            shadings,
             materials: &self.materials,
             lights: &self.lights,
             emitters: &self.emitters,
@@ -89,11 +103,12 @@ impl Prepared {
             environment_cdf: &self.environment_cdf,
             texels: &self.texels,
             textures: &self.textures,
-            coordinates: &scene.coordinates,
+            coordinates,
             profiles: &self.profiles,
             thickness: &self.thickness,
             balances: &self.balances,
             mixtures: &self.mixtures,
+            tree: None,
         }
     }
 }
@@ -142,6 +157,8 @@ pub(crate) struct Before<'a> {
 /// unless settings or materials ask for one; of the same materials nothing is made anew.
 pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<Before>) -> Result<Prepared> {
     scene::check_scene(scene)?;
+    host::check(scene, settings)?;
+    let settings = &host::effective(settings);
     let (width, height) = resolution(scene, settings)?;
     let [x0, y0, x1, y1] = settings.crop.unwrap_or([0, 0, width, height]);
     if x0 >= x1 || y0 >= y1 || x1 > width || y1 > height {
@@ -168,7 +185,8 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     let details = Detail::of(scene, &camera, height);
     let made = |index: usize| Some(&before?.prepared.advice.get(index)?.as_ref()?.choice);
     let advice = |(index, (material, detail))| model::advise(settings, material, detail, made(index));
-    let advice: Vec<_> = scene.materials.iter().zip(details).enumerate().map(advice).collect();
+    let mut advice: Vec<_> = scene.materials.iter().zip(details).enumerate().map(advice).collect();
+    host::advise(settings, &mut advice);
     let matter = match before.filter(|before| before.has(scene, &advice)) {
         Some(Before { prepared, .. }) => Matter::of(prepared),
         None => Matter::new(scene, settings, &advice)?,
@@ -246,6 +264,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         materials,
         has_translucent: models != 0,
         has_probes,
+        on_host: models & !(1 << MODEL_LAMBERT) != 0 && settings.integrator.is_on_host(),
         has_reflection: opaque
             || emits
             || settings.show_environment

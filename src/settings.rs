@@ -31,11 +31,34 @@ pub enum Integrator {
     /// Not for the directional dipole, sets of several materials and media that a texture changes, nor for recordings.
     /// Light enters on the outer side of surfaces alone.
     Cloud = shared::INTEGRATOR_CLOUD,
+    /// Points uniform over the area of the surfaces, with the same models, light and boundaries as [`Integrator::Sample`]
+    /// and nothing of its sampling: an independent reference, unbiased. In f64 on the host; slow, and noisy where the mean
+    /// free path is short beside the body. See [`reference::uniform`](crate::reference::uniform).
+    ///
+    /// Not for recordings, nor for an error as goal ([`Renderer::render_until`](crate::Renderer::render_until)).
+    Area = shared::INTEGRATOR_AREA,
+    /// Random walks through the matter itself, which the models approximate; they take no model. In f64 on the host, slow
+    /// where matter hardly absorbs. Exact but for delta lights, whose direction where they enter is forgotten; see
+    /// [`reference::walk::radiance`](crate::reference::walk::radiance).
+    ///
+    /// Not for sets of several materials, surfaces with holes and media, alpha or roughness that a texture changes, nor
+    /// for what [`Integrator::Area`] is not for.
+    Walk = shared::INTEGRATOR_WALK,
 }
 
 impl Integrator {
     /// Every integrator, with its name on the command line.
-    pub const NAMES: [(Integrator, &str); 2] = [(Integrator::Sample, "sample"), (Integrator::Cloud, "cloud")];
+    pub const NAMES: [(Integrator, &str); 4] = [
+        (Integrator::Sample, "sample"),
+        (Integrator::Cloud, "cloud"),
+        (Integrator::Area, "area"),
+        (Integrator::Walk, "walk"),
+    ];
+
+    /// Whether it computes the light that comes out of matter on the host.
+    pub fn is_on_host(self) -> bool {
+        matches!(self, Integrator::Area | Integrator::Walk)
+    }
 }
 
 impl fmt::Display for Integrator {

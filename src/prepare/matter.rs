@@ -39,7 +39,7 @@ impl Matter {
         let mixtures = sets::mixtures(scene, &materials)?;
         let clusters = match settings.integrator {
             Integrator::Cloud => cloud::clusters(scene, settings, &mut materials, &profiles, &thickness)?,
-            Integrator::Sample => vec![],
+            _ => vec![],
         };
         let rough_rows = boundaries.feature();
         let boundaries = boundaries.values;

@@ -108,6 +108,12 @@ pub fn time(text: &str) -> Result<Duration, String> {
     time.filter(|time| !time.is_zero()).ok_or("it is a time above 0, such as 30s, 500ms, 2min or 1h".into())
 }
 
+/// `HOST:PORT`.
+pub fn address(text: &str) -> Result<String, String> {
+    let split = text.rsplit_once(':').filter(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
+    split.map(|_| text.into()).ok_or("it is HOST:PORT, such as localhost:14158".into())
+}
+
 /// `R,G,B`, or one number for all.
 pub fn triple(text: &str) -> Result<[f64; 3], String> {
     let one = finite(text).ok().map(|value| [value; 3]);

@@ -12,6 +12,7 @@ pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod tables;
+mod tev;
 pub mod tradeoff;
 pub mod verify;
 

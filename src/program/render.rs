@@ -1,6 +1,6 @@
 //! `render`: a glTF scene becomes an EXR image, and a PNG where one is asked for.
 
-use super::{Failure, INTERRUPTED, arguments, log, print, profile, scene::SceneOptions};
+use super::{Failure, INTERRUPTED, arguments, log, print, profile, scene::SceneOptions, tev::Viewer};
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::{
@@ -68,6 +68,9 @@ pub struct Render {
     /// Vulkan device by index, part of the name, or UUID (see `devices`); without it the best.
     #[arg(long, value_name = "INDEX|NAME|UUID")]
     device: Option<String>,
+    /// Show the image while it is rendered in the viewer tev, which listens on port 14158. Without it the render goes on.
+    #[arg(long, value_name = "HOST:PORT", value_parser = arguments::address)]
+    tev: Option<String>,
     /// Time each kernel and what the host does: .json is a trace that Perfetto opens, .csv has a row for each kernel.
     /// May be repeated.
     #[arg(long, value_name = "FILE.json|.csv")]
@@ -105,24 +108,39 @@ impl Render {
             bar.suspend(|| self.warn(&format!("{why}; going on with a new device")));
             Device::open(&options)
         };
+        let mut viewer = self.tev.as_ref().and_then(|address| {
+            let viewer = Viewer::connect(address, output.display().to_string());
+            viewer.inspect_err(|error| self.warn(&format!("no tev at {address}: {error}"))).ok()
+        });
         let deadline = self.time.and_then(|time| begun.checked_add(time));
         let (_, (outcome, seconds, mut image)) = renderer.with_recovery(&scene, reopen, |renderer| {
-            let mut progress = |progress: &Progress| {
-                let (done, total) = self.part_done(begun, progress);
-                bar.set_length(total);
-                bar.set_position(done);
-                if let Some(error) = progress.error {
-                    bar.set_message(format!("error {:.2} %  ", 100.0 * error));
-                }
-                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            };
             let samples = self.samples();
-            let outcome = if samples.start == 0 {
-                let goal = Goal { samples: samples.end, error: self.error, deadline };
-                renderer.render_until(&goal, &mut progress)?
-            } else {
-                let finished = renderer.render_rest(samples, &mut progress)?;
-                Outcome { stop: if finished { Stop::Samples } else { Stop::Caller }, error: None }
+            let outcome = loop {
+                let mut shows = false;
+                let mut progress = |progress: &Progress| {
+                    let (done, total) = self.part_done(begun, progress);
+                    bar.set_length(total);
+                    bar.set_position(done);
+                    if let Some(error) = progress.error {
+                        bar.set_message(format!("error {:.2} %  ", 100.0 * error));
+                    }
+                    let stops = stop.load(Ordering::Relaxed);
+                    shows = !stops && viewer.as_ref().is_some_and(Viewer::is_due);
+                    if stops || shows { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                };
+                let outcome = if samples.start == 0 {
+                    let goal = Goal { samples: samples.end, error: self.error, deadline };
+                    renderer.render_until(&goal, &mut progress)?
+                } else {
+                    let finished = renderer.render_rest(samples.clone(), &mut progress)?;
+                    Outcome { stop: if finished { Stop::Samples } else { Stop::Caller }, error: None }
+                };
+                if outcome.stop != Stop::Caller || !shows {
+                    break outcome;
+                }
+                let since = Instant::now();
+                let image = renderer.image()?;
+                bar.suspend(|| self.show(&mut viewer, &image, since));
             };
             bar.finish_and_clear();
             let seconds = start.elapsed().as_secs_f64();
@@ -133,6 +151,7 @@ impl Render {
             self.warn(&format!("the error is {reached}, not {:.3} %, with all samples", 100.0 * asked));
         }
         let finished = outcome.stop != Stop::Caller;
+        self.show(&mut viewer, &image, Instant::now());
         self.keep_asked(&mut image);
         if let Some(Attribute::Integer(invalid @ 1..)) = image.attributes.get("translucent.invalidSamples") {
             self.warn(&format!("samples left out because they were not finite or negative: {invalid}"));
@@ -191,6 +210,14 @@ impl Render {
         }
     }
 
+    /// Shows an image in the viewer, if it is still there.
+    fn show(&self, viewer: &mut Option<Viewer>, image: &Image, since: Instant) {
+        if let Some(Err(error)) = viewer.as_mut().map(|viewer| viewer.show(image, since)) {
+            self.warn(&format!("tev shows no more: {error}"));
+            *viewer = None;
+        }
+    }
+
     fn settings(&self) -> Settings {
         Settings {
             seed: self.seed,
@@ -204,8 +231,8 @@ impl Render {
         match (&self.samples, self.scene.method.integrator) {
             (Some(samples), _) => samples.range.clone(),
             _ if self.error.is_some() || self.time.is_some() => 0..arguments::MAX_SAMPLES,
-            (None, Integrator::Sample) => 0..64,
             (None, Integrator::Cloud) => 0..4,
+            (None, _) => 0..64,
         }
     }
 

@@ -32,7 +32,7 @@ use super::sums::Contribution;
 use super::tile::{Place, coordinate, direction_point};
 use super::{Inputs, emitter, intersect, mixture, texture};
 use crate::shared::{
-    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_CLOUD, MAX_HITS, MISS,
+    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE, MAX_HITS, MISS,
     MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
     TEXTURE_BASE_COLOR, Triangle,
 };
@@ -83,15 +83,15 @@ pub fn accumulate(
     }
     let seen = seen(inputs, surface);
     let matter = matter_at(inputs, surface);
-    // Of all other matter light is gathered.
-    if inputs.features.integrator == INTEGRATOR_CLOUD && matter.material.model != MODEL_LAMBERT {
+    // Other integrators do the rest.
+    if inputs.features.integrator != INTEGRATOR_SAMPLE && matter.material.model != MODEL_LAMBERT {
         return Contribution::default();
     }
     // Hits of the others are shared.
     if inputs.features.reuse != 0 && matter.material.model != MODEL_LAMBERT {
         return Contribution::default();
     }
-    let (delta, triangle, factor) = if matter.material.model == MODEL_LAMBERT {
+    let entry = if matter.material.model == MODEL_LAMBERT {
         let weights = surface.barycentric.as_dvec2();
         let strength = texture::medium(inputs, matter.material, surface.triangle, weights).strength;
         (DVec3::ZERO, surface.triangle, strength.as_dvec3())
@@ -101,16 +101,30 @@ pub fn accumulate(
             None => return Contribution::default(),
         }
     };
+    let given = inputs.features.projection == PROJECTION_CAMERA;
+    let members = mixture::members(inputs, matter.material, surface.triangle);
+    let rate = members.first().map_or(0.0, |member| f64::from(member.camera_rate));
+    let exponent = if given { rate * f64::from(probe.radius) } else { 0.0 };
+    carried(inputs, step, index, surface, entry, exponent)
+}
+
+/// Light of the step's rays that enters at xo + `delta`, on `triangle`, and leaves `surface`. `factor` is e^exponent f / p;
+/// of the directional dipole, whose value comes with each ray, e^exponent / p.
+pub(super) fn carried(
+    inputs: &Inputs,
+    step: &Step,
+    index: u32,
+    surface: &Surface,
+    (delta, triangle, factor): (DVec3, u32, DVec3),
+    exponent: f64,
+) -> Contribution {
+    let (seen, matter) = (seen(inputs, surface), matter_at(inputs, surface));
     let point = surface.position.as_dvec3() + delta;
     let material = mixture::entered(inputs, matter.material, triangle);
     let entry = Entry::new(inputs, material, seen.side, point, triangle);
     let local = texture::medium(inputs, material, triangle, entry.weights);
     let local = Matter { material: &local, ..matter };
     let leaving = leaving(inputs, matter, local, &seen, surface);
-    let given = inputs.features.projection == PROJECTION_CAMERA;
-    let members = mixture::members(inputs, matter.material, surface.triangle);
-    let rate = members.first().map_or(0.0, |member| f64::from(member.camera_rate));
-    let exponent = if given { rate * f64::from(probe.radius) } else { 0.0 };
     let value = |wi: DVec3| match material.model {
         MODEL_DIRECTIONAL => directed(local, &seen, delta, entry.shading, wi, exponent),
         _ => profile::obliqueness(local, entry.shading.dot(wi), false),
@@ -326,7 +340,7 @@ fn direction_pdf(inputs: &Inputs, normal: DVec3, wi: DVec3) -> f64 {
 }
 
 /// Weights of the second and third vertex of a point in the plane of a triangle.
-fn barycentric(triangle: &Triangle, point: DVec3) -> DVec2 {
+pub(super) fn barycentric(triangle: &Triangle, point: DVec3) -> DVec2 {
     let [corner, edge1, edge2] = triangle.corner_and_edges();
     let p = point - corner;
     let normal = edge1.cross(edge2);

@@ -1,4 +1,5 @@
-//! Rays and triangles: brute force over all triangles, so that no acceleration structure is part of the reference.
+//! Rays and triangles: brute force over all triangles, so that no acceleration structure is part of the reference; but for
+//! integrators on the host, whose shadow rays ask a tree of their own which triangles to look at.
 //!
 //! S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", J. Computer Graphics Techniques 2 (2013): let the
 //! ray start in the origin, and z be the axis along which it runs most. Seen along the ray a vertex v is at
@@ -13,7 +14,7 @@
 //!
 //! The distance is t = n . (a - o) / (n . d), with n = (b - a) x (c - a).
 
-use super::{Inputs, texture};
+use super::{Inputs, texture, walk::mesh::Mesh};
 use crate::shared::Triangle;
 use glam::{DVec2, DVec3, Vec3Swizzles};
 
@@ -106,10 +107,41 @@ pub fn hits(inputs: &Inputs, origin: DVec3, direction: DVec3, t_min: f64, t_max:
 
 /// The hit with the smallest t.
 pub fn closest(inputs: &Inputs, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<Hit> {
+    if let Some(tree) = inputs.tree.filter(|_| t_min >= 0.0) {
+        return found(inputs, tree, origin, direction, (t_min, t_max), |hit| hit.t);
+    }
     hits(inputs, origin, direction, t_min, t_max).min_by(|a, b| a.t.total_cmp(&b.t))
 }
 
 /// Whether anything is hit.
 pub fn any(inputs: &Inputs, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> bool {
+    if let Some(tree) = inputs.tree.filter(|_| t_min >= 0.0) {
+        return found(inputs, tree, origin, direction, (t_min, t_max), |_| f64::NEG_INFINITY).is_some();
+    }
     hits(inputs, origin, direction, t_min, t_max).next().is_some()
+}
+
+/// The last hit found in `range` of those that come before the `limit` that the one before left.
+fn found(
+    inputs: &Inputs,
+    tree: &Mesh,
+    origin: DVec3,
+    direction: DVec3,
+    (t_min, t_max): (f64, f64),
+    limit: impl Fn(&Hit) -> f64,
+) -> Option<Hit> {
+    let line = Line::new(origin, direction);
+    let (mut last, mut end) = (None, t_max);
+    tree.candidates(origin, direction, t_max, |index| {
+        let triangle = index as u32;
+        if let Some((t, barycentric)) = line.meets(&inputs.triangles[index])
+            && (t_min..=end).contains(&t)
+            && texture::solid(inputs, triangle, barycentric)
+        {
+            let hit = Hit { t, triangle, barycentric };
+            (last, end) = (Some(hit), limit(&hit));
+        }
+        end
+    });
+    last
 }

@@ -1,8 +1,8 @@
 //! The kernels in f64, written from the formulas: twins of `glsl/*.comp` and `glsl/*.glsl` under the same stems.
 //!
 //! A twin takes what one invocation of its kernel reads and returns what it writes, in the shared structs; inside it
-//! computes in f64. [`render`] runs them in order. [`area`] is an integrator of its own that shares nothing with them;
-//! [`mod@walk`] is what the models approximate.
+//! computes in f64. [`render`] runs them in order. [`area`] is an integrator of its own that shares nothing with them,
+//! [`mod@uniform`] one that shares what leaves and what enters; [`mod@walk`] is what the models approximate.
 
 pub mod accumulate;
 pub mod area;
@@ -34,6 +34,7 @@ pub mod strict;
 pub mod sums;
 pub mod texture;
 pub mod tile;
+pub mod uniform;
 pub mod walk;
 
 use crate::shared::{
@@ -74,6 +75,8 @@ pub struct Inputs<'a> {
     pub balances: &'a [Balance],
     /// Media of each set; empty where none holds several materials.
     pub mixtures: &'a [Mixture],
+    /// Finds triangles that a ray may meet, where there is one; else rays look at all of them.
+    pub tree: Option<&'a walk::mesh::Mesh>,
 }
 
 /// The step of one sample that traces all its rays in one dispatch.

@@ -29,7 +29,7 @@
 //! dipole keeps rho_e in its dependence on direction: with it a furnace closes only about as well as T is like 1 - F.
 
 use super::Inputs;
-use super::boundary::{cos_refracted, smith_g1, smith_g2, transmittance};
+use super::boundary::{Side, cos_refracted, diffuse_reflectance, smith_g1, smith_g2, transmittance};
 use super::math::integrate;
 use crate::Normalisation;
 use crate::shared::{BOUNDARY_NODES, BOUNDARY_ROW, Material, ROUGHNESS_ROWS};
@@ -199,6 +199,16 @@ pub fn crossing(inputs: &Inputs, material: &Material, cos: f64, share: f64) -> f
     let (rows, above) = rows(inputs, material, share);
     let [low, high] = rows.map(|row| interpolated(&row[..BOUNDARY_NODES as usize], cos));
     low + above * (high - low)
+}
+
+/// 1 - rho_e of a material's boundary: the share of diffuse light that enters. (With [`Normalisation::Jensen2001`] a rough
+/// one's is not kept, and 1.)
+pub fn entering_share(inputs: &Inputs, material: &Material) -> f64 {
+    if material.boundary == 0 {
+        return 1.0 - diffuse_reflectance(material.ior.into(), Side::Outside);
+    }
+    let ([_, factor], _) = rows(inputs, material, 1.0);
+    f64::from(factor[BOUNDARY_NODES as usize])
 }
 
 /// What a texture of the roughness makes of radiance that leaves, besides its crossing: rho_e is that of the place.

@@ -119,8 +119,8 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::render_range`]; [`Error::Setting`] for a goal that is out of range, or an error as goal of a
-    /// renderer that was made without [`Settings::estimate_error`](crate::Settings::estimate_error), records, or
-    /// gathers from a cloud, whose error all samples share.
+    /// renderer that was made without [`Settings::estimate_error`](crate::Settings::estimate_error), records, computes
+    /// on the host, or gathers from a cloud, whose error all samples share.
     pub fn render_until(
         &mut self,
         goal: &Goal,
@@ -134,6 +134,9 @@ impl Renderer {
                 _ if !(error.is_finite() && error > 0.0) => format!("{error} is not a finite number above 0"),
                 _ if self.settings.integrator == Integrator::Cloud => {
                     "cannot be estimated where light is gathered from a cloud: all samples share it".into()
+                }
+                _ if self.settings.integrator.is_on_host() => {
+                    format!("is no goal of the integrator {}: it works on all pixels", self.settings.integrator)
                 }
                 _ if self.settings.recording => "is no goal of a renderer that records".into(),
                 _ if !self.settings.estimate_error => "needs `estimate_error` in the renderer's settings".into(),

@@ -11,6 +11,9 @@ use crate::{
 /// Pixels of a band where nothing else limits it: enough to fill a GPU, few enough for a processor's caches.
 const BAND_PIXELS: u32 = 1 << 18;
 
+/// The same where the host computes light: few enough for progress to be seen.
+const HOST_PIXELS: u32 = 1 << 14;
+
 /// Workgroups of one dimension that every device allows (Vulkan 1.3, table 58).
 const GROUPS: u64 = 65_535;
 
@@ -111,9 +114,10 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let width = prepared.view.crop_width;
     // Half of the memory is left to the scene and to others. Whether it suffices at all is asked later.
     let memory = limits.heap_bytes.min(if limits.shared { limits.host_bytes } else { u64::MAX });
+    let pixels = if prepared.on_host { HOST_PIXELS } else { BAND_PIXELS };
     let wanted = match settings.recording {
         true => u64::MAX,
-        false => u64::from(settings.band_pixels.unwrap_or(BAND_PIXELS)).min(memory / 2 / whole),
+        false => u64::from(settings.band_pixels.unwrap_or(pixels)).min(memory / 2 / whole),
     };
     if u64::from(width) > limit {
         return Err(Error::Memory {

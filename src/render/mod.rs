@@ -6,6 +6,7 @@ mod bands;
 mod budget;
 mod cloud;
 mod error;
+mod host;
 mod plan;
 mod record;
 mod sums;
@@ -110,6 +111,8 @@ pub struct Renderer {
     begin: Option<u32>,
     /// The cloud is lit, and by the lights that there are.
     lit: bool,
+    /// Where the host computes light.
+    host: Option<host::Host>,
     /// Pixels have different numbers of samples.
     adaptive: bool,
     /// What [`Renderer::render_until`] found last.
@@ -242,6 +245,7 @@ impl Renderer {
             (true, Some(_)) => Some(Recorder::profiled(device)?),
         };
         let geometry = scene::geometry(scene);
+        let host = host::Host::new(scene, &prepared, settings.integrator);
         Ok(Renderer {
             device: device.clone(),
             frame: scene.frame,
@@ -260,6 +264,7 @@ impl Renderer {
             strata: [None; BATCHES as usize],
             begin: None,
             lit: false,
+            host,
             adaptive: false,
             outcome: None,
             pace: Default::default(),
@@ -372,6 +377,7 @@ impl Renderer {
                         stop = true;
                         break;
                     };
+                    let count = if self.host.is_some() { 1 } else { count };
                     let end = pass.end.min(next.saturating_add(count));
                     self.submit_samples(band, next..end, None).inspect_err(|_| self.distrust(band))?;
                     self.keep_in_time()?;
@@ -432,9 +438,10 @@ impl Renderer {
         }
         recorder.submit_and_wait()?;
         bands[band].changed = true;
+        self.add_on_host(band, samples.start)?;
         // Of listed pixels others are behind.
         if listed.is_none() {
-            bands[band].end = samples.end;
+            self.bands[band].end = samples.end;
         }
         let worked = listed.unwrap_or(pixels);
         self.pace.note(start, u64::from(worked) * samples.len() as u64);
@@ -485,7 +492,8 @@ impl Kernels {
         primary: bool,
         dispatch: &mut dyn FnMut(&Kernel, bool, &Step),
     ) {
-        (step.first, step.count) = (1, 1);
+        // The host counts for itself.
+        (step.first, step.count) = (1, u32::from(!prepared.on_host));
         if primary {
             self.primary.iter().for_each(|kernel| dispatch(kernel, true, &step));
         }

@@ -112,6 +112,8 @@ impl Plan {
     }
 }
 
+const ON_HOST: &str = "the host computes the light that comes out of matter";
+
 /// Whether anything in the scene needs a kernel, and what does or would.
 pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
     match stem {
@@ -129,11 +131,13 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
         "sample" | "reproject" => match (prepared.has_probes, prepared.has_translucent) {
             (true, _) => (true, "a surface is translucent"),
             (false, true) if !prepared.clusters.is_empty() => (false, "light is gathered from a cloud of points"),
+            (false, true) if prepared.on_host => (false, ON_HOST),
             (false, true) => (false, "every translucent surface is in the opaque limit: light leaves where it entered"),
             (false, false) => (false, "no surface is translucent"),
         },
         "accumulate" => match prepared.has_translucent {
-            true if prepared.clusters.is_empty() => (true, "a surface is translucent"),
+            true if prepared.clusters.is_empty() && !prepared.on_host => (true, "a surface is translucent"),
+            true if prepared.on_host && prepared.features.models & (1 << MODEL_LAMBERT) == 0 => (false, ON_HOST),
             true if prepared.features.models & (1 << MODEL_LAMBERT) == 0 => {
                 (false, "light is gathered from a cloud of points")
             }
@@ -234,7 +238,9 @@ fn absent(slot: Slot) -> String {
         Slot::Profiles => "no material has the table model",
         Slot::Thickness | Slot::Balances => "no profile depends on the curvature",
         Slot::Mixtures => "no set holds several materials",
-        Slot::Probes | Slot::HitLists => "no surface is translucent, all are in the opaque limit, or light is gathered",
+        Slot::Probes | Slot::HitLists => {
+            "no surface is translucent, all are in the opaque limit, or light is gathered or computed on the host"
+        }
         Slot::Clusters => "no light is gathered from a cloud",
         Slot::Gathers => "one dispatch gathers all light, or none is gathered",
         Slot::BatchSums => "no variance is asked for",

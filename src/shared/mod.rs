@@ -69,6 +69,10 @@ constants! {
     INTEGRATOR_SAMPLE: u32 = 0;
     /// Integrator: points on the surface are lit once, and each pixel gathers from them.
     INTEGRATOR_CLOUD: u32 = 1;
+    /// Integrator: points uniform over the area of the surface, on the host.
+    INTEGRATOR_AREA: u32 = 2;
+    /// Integrator: random walks through the matter, on the host.
+    INTEGRATOR_WALK: u32 = 3;
 
     /// Projection: all techniques combined by the balance heuristic.
     PROJECTION_MIS: u32 = 0;

@@ -69,6 +69,7 @@ impl World {
             thickness: &self.thickness,
             balances: &self.balances,
             mixtures: &self.mixtures,
+            tree: None,
         }
     }
 

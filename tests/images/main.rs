@@ -17,6 +17,7 @@ mod measure;
 mod mixtures;
 #[path = "../common/pool.rs"]
 mod pool;
+mod references;
 mod repeatable;
 mod reuse;
 mod scenes;

@@ -14,6 +14,7 @@ mod profile;
 #[allow(dead_code)]
 #[path = "../images/scenes.rs"]
 mod scenes;
+mod tev;
 mod textures;
 mod tradeoff;
 mod usage;

@@ -45,7 +45,7 @@ pub struct Tradeoff {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = models(),
           default_value = "standard,better,directional,burley,table")]
     models: Vec<Model>,
-    /// Integrators to compare.
+    /// Integrators to compare. A walk takes no model: what it differs from one counts as its sampling error.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = integrators(),
           default_value = "sample,cloud")]
     integrators: Vec<Integrator>,

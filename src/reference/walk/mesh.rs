@@ -191,6 +191,17 @@ impl Mesh {
 
     /// Calls `hit` with distance and triangle of what the ray meets up to `limit`, in no order; it returns the new limit.
     pub fn visit(&self, origin: DVec3, direction: DVec3, limit: f64, mut hit: impl FnMut(f64, usize) -> f64) {
+        let mut nearest = limit;
+        self.candidates(origin, direction, limit, |index| {
+            if let Some(t) = self.triangles[index].meet(origin, direction).filter(|&t| t <= nearest) {
+                nearest = hit(t, index);
+            }
+            nearest
+        });
+    }
+
+    /// Calls `found` with every triangle that the ray may meet up to `limit`, in no order; it returns the new limit.
+    pub fn candidates(&self, origin: DVec3, direction: DVec3, limit: f64, mut found: impl FnMut(usize) -> f64) {
         let mut limit = limit;
         let slope = direction.recip();
         let near = |node: &Node| {
@@ -211,9 +222,7 @@ impl Mesh {
             let node = &self.nodes[index as usize];
             if node.count > 0 {
                 for &index in &self.order[node.first as usize..(node.first + node.count) as usize] {
-                    if let Some(t) = self.triangles[index as usize].meet(origin, direction).filter(|&t| t <= limit) {
-                        limit = hit(t, index as usize);
-                    }
+                    limit = found(index as usize);
                 }
                 continue;
             }

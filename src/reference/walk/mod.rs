@@ -17,13 +17,17 @@
 //!
 //! A light without extent cannot be met by a path that leaves through a smooth surface. So the walk goes from the light:
 //! [`exitance`] counts what leaves each part of a surface. [`searchlight`] does so for one thin beam onto a half-space.
+//! [`radiance`] goes from the eye, and says what it does instead.
 
+pub mod boundary;
 pub mod exitance;
 pub mod mesh;
 pub mod model;
+pub mod radiance;
 pub mod searchlight;
 pub mod shape;
 
+use boundary::{Boundary, Onward};
 use glam::DVec3;
 use rayon::prelude::*;
 use shape::{Met, Shape};
@@ -100,9 +104,22 @@ pub enum End {
     Lost,
 }
 
-/// Follows light inside `shape` from `position` on its surface in the unit vector `direction`, which points inside.
+/// Follows light inside `shape` from `position` on its surface in the unit vector `direction`, which points inside. The
+/// surface is smooth.
 pub fn walk(shape: &impl Shape, matter: &Matter, position: DVec3, direction: DVec3, random: &mut Random) -> End {
-    let Matter { sigma_s, sigma_a, g, ior } = *matter;
+    walk_behind(&Boundary { ior: matter.ior, alpha: 0.0 }, shape, matter, position, direction, random)
+}
+
+/// As [`walk`], behind a surface that may be rough.
+pub fn walk_behind(
+    boundary: &Boundary,
+    shape: &impl Shape,
+    matter: &Matter,
+    position: DVec3,
+    direction: DVec3,
+    random: &mut Random,
+) -> End {
+    let Matter { sigma_s, sigma_a, g, .. } = *matter;
     let late = -LATE.ln() / sigma_a;
     let end = late + random.exponential() / sigma_a;
     let (mut position, mut direction) = (position, direction);
@@ -124,13 +141,13 @@ pub fn walk(shape: &impl Shape, matter: &Matter, position: DVec3, direction: DVe
                 if length > end {
                     break;
                 }
-                let cos = direction.dot(normal);
-                let (reflectance, refracted) = interface(1.0 / ior, cos);
-                if random.next() < reflectance {
-                    direction = (direction - 2.0 * cos * normal).normalize();
-                    continue;
-                }
-                let direction = (ior * (direction - cos * normal) + refracted * normal).normalize();
+                let direction = match boundary.from_inside(direction, normal, random) {
+                    Onward::Out(direction) => direction,
+                    Onward::Back(back) => {
+                        direction = back;
+                        continue;
+                    }
+                };
                 let survival = if length > late { (-sigma_a * (length - late)).exp() } else { 1.0 };
                 return End::Left(Exit { position, normal, direction, place, length, scatterings, survival });
             }
