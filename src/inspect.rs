@@ -62,9 +62,9 @@ pub struct MatterReport {
     pub g: DVec3,
     /// alpha' = sigma_s' / sigma_t'.
     pub albedo: DVec3,
-    /// 1 / sigma_t' [mm].
+    /// 1 / sigma_t' (mm).
     pub mean_free_path: DVec3,
-    /// 1 / sigma_tr [mm]; infinite without absorption.
+    /// 1 / sigma_tr (mm); infinite without absorption.
     pub diffuse_mean_free_path: DVec3,
     /// Of a plane, per unit flux that entered, by the model.
     pub total_reflectance: DVec3,

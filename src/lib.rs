@@ -37,7 +37,8 @@
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
 //!   primary                       sample         reproject       accumulate, single, reflect     resolve
 //!   └► Surfaces[pixel, batch],    └► Probes      └► HitLists     └► RunningSums, BatchSums       └► Pixels ─► Image
-//!      Actives                                                     count: how many samples
+//!      Actives                                                     reuse: hits of a tile's pixels
+//!                                                                  count: how many samples
 //!
 //!   Integrator::Cloud, in place of sample, reproject and accumulate:
 //!   ┌─── when the lights change ───┐               ┌──────── per sample ────────┐
@@ -59,7 +60,12 @@
 //!
 //! *Bands.* An image with more pixels than [`Settings::band_pixels`] is cut into bands of rows. They take turns on the
 //! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
-//! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups.
+//! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups; but where pixels
+//! of a tile share hits ([`Settings::reuse`]) its noise does on bands, whose edges cut tiles.
+//!
+//! *Tiles.* `accumulate` leaves the hit that it lit in HitLists, with its light over the values of the tile's pixels, and
+//! `reuse` adds the tile's hits to each pixel ([`reference::reuse`]). Tiles lie elsewhere in each batch. Around a crop
+//! the pixels are rendered, too, whose hits it shares. What was written in another sample is told by `Probe::stamp`.
 //!
 //! *Lists.* `primary` lists the pixels of a batch that see something, and the kernels after it are dispatched indirectly
 //! over that list alone. Where an image is to have a certain error ([`Renderer::render_until`]), the host also lists the
@@ -99,7 +105,7 @@
 //! | [`render`] | all of these | [`Renderer`]: the order of the kernels, bands, the finished image; what they require |
 //! | [`measure`] | all of these | numeric experiments: kernels beside closed forms |
 //! | [`model_errors`] | `scene`, `settings`, `reference` | how far each model is from a random walk |
-//! | [`bench`] | all of these | fixed work, timed again and again, and compared |
+//! | [`mod@bench`] | all of these | fixed work, timed again and again, and compared |
 //! | [`tradeoff`] | all of these | one scene rendered in many ways, each with its time and its error |
 //! | [`inspect`] | all of these | what a scene requires and why, for people and machines |
 //! | [`verify`] | all of these | tests of a driver: functions and kernels beside their twins |

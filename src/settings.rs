@@ -276,7 +276,8 @@ pub struct Settings {
     /// cuts tiles ([`reuse`](Settings::reuse)).
     pub band_pixels: Option<u32>,
     /// Makes what [`Renderer::record`](crate::Renderer::record) needs: one band, whatever `band_pixels` says, colours
-    /// in a buffer of their own, and the count of samples on the device. The image does not depend on it.
+    /// in a buffer of their own, and the count of samples on the device. The image does not depend on it, but for noise at
+    /// the edge of a [crop](Settings::crop).
     pub recording: bool,
     /// Invocations of a workgroup, 1 to 128; the image does not depend on it.
     pub workgroup: u32,

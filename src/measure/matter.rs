@@ -97,18 +97,18 @@ impl Matter {
         Profile::new(self.constant, &Coefficients::of(&self.medium, self.ior, channel).in_units(1.0 / MM))
     }
 
-    /// What a channel sends out within a radius [mm] of a perpendicular beam, per flux that entered.
+    /// What a channel sends out within a radius (mm) of a perpendicular beam, per flux that entered.
     pub fn beam(&self, channel: usize) -> Box<dyn Fn(f64) -> f64> {
         let coefficients = Coefficients::of(&self.medium, self.ior, channel).in_units(1.0 / MM);
         model::beam(self.model, &coefficients).expect("the model was found when the matter was made")
     }
 
-    /// 1 / sigma_t' of each channel [mm].
+    /// 1 / sigma_t' of each channel (mm).
     pub fn mean_free_path(&self) -> DVec3 {
         1.0 / (self.medium.sigma_s_prime + self.medium.sigma_a) / MM
     }
 
-    /// Half the side of a body that stands for a half-space [mm]: beyond it lies a millionth of the light, or less than
+    /// Half the side of a body that stands for a half-space (mm): beyond it lies a millionth of the light, or less than
     /// [`Matter::lost`] where a profile without absorption reaches farther than kernels can see.
     pub fn reach(&self) -> f64 {
         let reach = (0..3).map(|c| self.profile(c).radius_beyond(1e-6)).fold(0.0, f64::max);

@@ -81,7 +81,7 @@ pub fn matter(sigma_s_prime: [f64; 3], sigma_a: [f64; 3], ior: f64) -> Value {
 pub struct Eye {
     pub eye: DVec3,
     pub at: DVec3,
-    /// Full vertical angle [radians]; for an orthographic camera half the height [m], negated.
+    /// Full vertical angle (radians); for an orthographic camera half the height (m), negated.
     pub lens: f64,
 }
 

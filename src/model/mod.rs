@@ -1,11 +1,11 @@
 //! Which profile a material gets, and why: the setting, else what its file says, else what is recommended.
 //!
 //! # What is recommended
-//! What the scene requires, no more, by the [errors](errors) that a random walk shows:
+//! What the scene requires, no more, by the [errors] that a random walk shows:
 //!
 //! - The error that a pixel can show is the model's error of the total, and of the light that it puts in the wrong place
 //!   the part min(1, m / p) that crosses a pixel of width p, where m is the mean distance that light travels inside.
-//! - The diffusion model with the least such error is enough where that is at most [`ENOUGH`].
+//! - The diffusion model with the least such error is enough where that is at most `ENOUGH`.
 //! - Else the tabulated profile.
 //! - Where no pixel shows the profile at all, and light crosses no wall, its opaque limit takes its place.
 //!

@@ -1,7 +1,7 @@
 //! How far each model is from a random walk through the same matter.
 //!
 //! Every model of the renderer is tried on bodies of several sizes; the truth is [`walk`](mod@crate::reference::walk), and
-//! the model stands in its place ([`predict`](crate::reference::walk::model::predict)), so that light, bins and boundary
+//! the model stands in its place ([`predict`]), so that light, bins and boundary
 //! are the same. No kernel and no twin of the projection takes part.
 //!
 //! # How to read the tables

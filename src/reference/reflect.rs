@@ -6,7 +6,7 @@
 //!
 //! Directions come from several densities, chosen by an interval of u1 and combined by the balance heuristic: visible
 //! normals, the cosine (opaque matter), the environment's image. What emits is also found by points drawn on it; see
-//! [`emitter`](super::emitter).
+//! [`emitter`].
 
 use super::accumulate::{from_direction, from_emitter, lifted, visibility};
 use super::boundary::{ggx, schlick, smith_g2, visible_normal, visible_normal_pdf};

@@ -2,7 +2,7 @@
 //!
 //! # Light
 //! Diffusion describes light that was scattered often; of the models, the standard and the better dipole leave out what
-//! was scattered once ([`is_missing`]). In matter with the extinction sigma_t = sigma_a + sigma_s, sigma_s = sigma_s' /
+//! was scattered once (`is_missing`). In matter with the extinction sigma_t = sigma_a + sigma_s, sigma_s = sigma_s' /
 //! (1 - g), neither reduced, behind a smooth surface with the index of refraction n inside over outside (S. Chandrasekhar,
 //! "Radiative Transfer", 1950; H. W. Jensen, S. R. Marschner, M. Levoy, P. Hanrahan, SIGGRAPH 2001, section 2.2):
 //!

@@ -58,9 +58,9 @@ impl Scene {
     /// back by the caller, once.
     ///
     /// # Errors
-    /// [`Error::Scene`] that names the mesh and what it breaks: an index beyond its vertices, arrays of other lengths,
+    /// [`Error::Scene`](crate::Error::Scene) that names the mesh and what it breaks: an index beyond its vertices, arrays of other lengths,
     /// numbers that are not finite; geometry that is empty or too large; matter of several indices of refraction in one
-    /// set. [`Error::Setting`] for materials and pictures that are none. No input makes it panic.
+    /// set. [`Error::Setting`](crate::Error::Setting) for materials and pictures that are none. No input makes it panic.
     pub fn from_meshes(meshes: &[Mesh], materials: Vec<Material>, pictures: Vec<Picture>) -> Result<Scene> {
         let file = Path::new(FILE);
         materials.iter().try_for_each(check::check_material)?;

@@ -100,7 +100,7 @@ macro_rules! buffers {
     };
 }
 
-/// A specialization constant as [`Features::named`] shows it.
+/// A specialization constant as `Features::named` shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NamedFeature {
     pub name: &'static str,

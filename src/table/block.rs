@@ -63,7 +63,7 @@ struct Column {
 }
 
 impl Block {
-    /// The tables of three channels on spheres of the radii 2^(i/2 - 1) [length], i ascending, and on the half-space.
+    /// The tables of three channels on spheres of the radii 2^(i/2 - 1) (length), i ascending, and on the half-space.
     pub fn new(channels: &[Option<Channel>; 3], spheres: &[i32]) -> Block {
         let present = || channels.iter().flatten();
         let finest = present().map(|c| 1.0 / (c.scattering / c.albedo)).fold(f64::INFINITY, f64::min);

@@ -7,7 +7,7 @@
 //!   Lo = Ft(wo) T / (pi (1 - rho_e)) int Ft(wi) Li cos dw,
 //!
 //! which they approach in proportion to the mean free path. T is the total of the profile whose limit it is; of a table's,
-//! [`obliqueness`] comes along. There is no radius to draw and no surface to look for: the exit is the entry.
+//! `obliqueness` comes along. There is no radius to draw and no surface to look for: the exit is the entry.
 
 use super::{COMPONENTS, Coefficients, Dipole, Matter, Options, Profile, Radial};
 use crate::reference::boundary::Side;
