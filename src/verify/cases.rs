@@ -189,6 +189,8 @@ fn tiled() -> Result<Vec<Case>> {
     for (seed, (name, model, light, reuse)) in (23..).zip(list) {
         let mut materials = materials();
         materials[0]["extras"]["bssrdf"]["ior"] = json!(1.3);
+        // What the table sees is not shared with what the ball sees beside it.
+        materials[1] = matter([2.0, 3.0, 4.0], [0.3, 0.2, 0.1], 1.3);
         let scene = still_life(&materials, light)?;
         cases.push(Case::new(name, scene, &Settings { model, reuse, ..settings(seed) })?);
     }
