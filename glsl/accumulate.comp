@@ -18,8 +18,8 @@ SHADINGS(readonly);
 #include "emitter.glsl"
 #include "arriving.glsl"
 SURFACES(readonly);
-PROBES(readonly);
-HIT_LISTS(read_write);
+PROBES(read_write);
+HIT_LISTS(readonly);
 #include "mixture.glsl"
 #include "shared_hit.glsl"
 
@@ -71,7 +71,6 @@ void main() {
     uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     Surface surface = surfaces[surface_index(index)];
-    if (REUSE != 0u && step_.ray_begin == 0u) hit_lists[index].light = vec3(0.0);
     bool covered = surface.triangle != MISS;
     if (step_.count != 0u) count_covered(index, covered);
     if (!covered || step_.ray_count == 0u) return;
@@ -170,8 +169,8 @@ void main() {
     if (REUSE != 0u && !has_model(m, MODEL_LAMBERT)) {
         if (has_texture(TEXTURE_BASE_COLOR)) entering *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb;
         if (entering == vec3(0.0)) return;
-        hit_lists[index].delta = delta;
-        hit_lists[index].light += entering * factor / tile_value(tile_of(view, place, batch), view.crop_width, m, index, delta);
+        probes[index].delta = delta;
+        probes[index].light += entering * factor / tile_value(tile_of(view, place, batch), view.crop_width, m, index, delta);
         return;
     }
 

@@ -16,7 +16,6 @@ TRIANGLES(readonly);
 SHADINGS(readonly);
 SURFACES(readonly);
 PROBES(readonly);
-HIT_LISTS(readonly);
 #include "shared_hit.glsl"
 
 void main() {
@@ -37,9 +36,9 @@ void main() {
         [[dont_unroll]] for (uint x = tile.first.x; x < tile.end.x; x++) {
             uint other = y * view.crop_width + x;
             if (!shares(other, group)) continue;
-            vec3 light = hit_lists[other].light;
+            vec3 light = probes[other].light;
             if (light == vec3(0.0)) continue;
-            vec3 delta = surfaces[surface_index(other)].position - surface.position + hit_lists[other].delta;
+            vec3 delta = surfaces[surface_index(other)].position - surface.position + probes[other].delta;
             sum += light * value_at(m, delta, other == index);
         }
     }

@@ -30,6 +30,8 @@ void main() {
     probe.table_weight = 1.0;
     probe.table_bend = vec2(0.0);
     probe.table_scale = 0.0;
+    probe.delta = vec3(0.0);
+    probe.light = vec3(0.0);
     probes[index] = probe;
     Surface surface = surfaces[surface_index(index)];
     if (surface.triangle == MISS) return;

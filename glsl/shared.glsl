@@ -623,6 +623,9 @@ struct Probe {
     float table_weight;
     vec2 table_bend;
     float table_scale;
+    // Written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
+    vec3 delta;
+    vec3 light;
 };
 
 // Where a probe meets surfaces of its set, written by `reproject`.
@@ -631,9 +634,6 @@ struct Hits {
     uint count;
     float t[8];
     uint triangle[8];
-    // Tiles only, written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
-    vec3 delta;
-    vec3 light;
 };
 
 // Running sums of a pixel, compensated: the true sum is `x + x_carry` (Neumaier / TwoSum).

@@ -63,7 +63,7 @@
 //! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups; but where pixels
 //! of a tile share hits ([`Settings::reuse`]) its noise does on bands, whose edges cut tiles.
 //!
-//! *Tiles.* `accumulate` leaves the hit that it lit in HitLists, with its light over the values of the tile's pixels, and
+//! *Tiles.* `accumulate` leaves the hit that it lit in Probes, with its light over the values of the tile's pixels, and
 //! `reuse` adds the tile's hits to each pixel ([`reference::reuse`]). Tiles lie elsewhere in each batch. Around a crop
 //! the pixels are rendered, too, whose hits it shares. What was written in another sample is told by `Probe::stamp`.
 //!

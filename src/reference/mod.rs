@@ -41,7 +41,7 @@ use crate::shared::{
     BATCHES, Balance, Coordinates, Emitter, Features, Hits, Light, Material, Mixture, Pixel, Probe, Shading, Step,
     Sums, Surface, Texture, Triangle, View,
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -112,25 +112,27 @@ pub fn render(inputs: &Inputs, rows: Range<u32>, samples: Range<u32>) -> Vec<Pix
         }
         let (_, surfaces) = first[batch].as_ref().expect("traced above");
         let probe = |index| sample::sample(inputs, &step, index, &surfaces[index as usize]);
-        let probes: Vec<Probe> = of_each().map(probe).collect();
+        let mut probes: Vec<Probe> = of_each().map(probe).collect();
         let hit = |index| {
             let (surface, probe) = (&surfaces[index as usize], &probes[index as usize]);
-            let hits = reproject::reproject(inputs, &step, index, surface, probe);
-            if inputs.features.reuse == 0 {
-                return hits;
-            }
-            let lit = reuse::light(inputs, &step, index, &reuse::Stage { surfaces, probes: &probes }, &hits);
-            let (delta, light) = lit.unwrap_or_default();
-            Hits { delta: delta.as_vec3(), light: light.as_vec3(), ..hits }
+            reproject::reproject(inputs, &step, index, surface, probe)
         };
         let hits: Vec<Hits> = of_each().map(hit).collect();
+        if inputs.features.reuse != 0 {
+            let stage = reuse::Stage { surfaces, probes: &probes };
+            let light = |index| reuse::light(inputs, &step, index, &stage, &hits[index as usize]).unwrap_or_default();
+            let lit: Vec<(DVec3, DVec3)> = of_each().map(light).collect();
+            for (probe, (delta, light)) in probes.iter_mut().zip(lit) {
+                (probe.delta, probe.light) = (delta.as_vec3(), light.as_vec3());
+            }
+        }
         let stage = reuse::Stage { surfaces, probes: &probes };
         let add = |(index, (sums, batch_sums)): (usize, (&mut Sums, &mut [Vec3; BATCHES as usize]))| {
             let (surface, i) = (&surfaces[index], index as u32);
             let own = accumulate::accumulate(inputs, &step, i, surface, &probes[index], &hits[index]);
             own.add_subsurface(&step, surface, sums, &mut batch_sums[batch]);
             if inputs.features.reuse != 0 {
-                reuse::reuse(inputs, &step, i, &stage, &hits).add_single(sums, &mut batch_sums[batch]);
+                reuse::reuse(inputs, &step, i, &stage).add_single(sums, &mut batch_sums[batch]);
             }
             let reflection = reflect::reflect(inputs, &step, i, surface);
             reflection.add_reflection(sums, &mut Vec3::ZERO.clone());

@@ -64,8 +64,8 @@ pub fn light(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &Hit
     Some((delta, light * weighted.element_sum() / tile_value(inputs, step, stage, index, delta)))
 }
 
-/// The contribution of the tile's hits to pixel `index`. Of hits only `delta` and `light` are read.
-pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &[Hits]) -> Contribution {
+/// The contribution of the tile's hits to pixel `index`, with what [`light`] found in the probes.
+pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage) -> Contribution {
     let surface = &stage.surfaces[index as usize];
     if stage.probes[index as usize].stamp != step.sample_index + 1 {
         return Contribution::default();
@@ -73,7 +73,7 @@ pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &[Hi
     let matter = matter_at(inputs, surface);
     debug_assert!(matter.material.model != MODEL_LAMBERT, "no probe is drawn in the opaque limit");
     let of = |other: u32| {
-        let Hits { delta, light, .. } = hits[other as usize];
+        let Probe { delta, light, .. } = stage.probes[other as usize];
         let delta = stage.position(other) - stage.position(index) + delta.as_dvec3();
         light.as_dvec3() * value(matter, delta, other == index)
     };

@@ -31,6 +31,8 @@ pub const NONE: Probe = Probe {
     table_weight: 1.0,
     table_bend: glam::Vec2::ZERO,
     table_scale: 0.0,
+    delta: glam::Vec3::ZERO,
+    light: glam::Vec3::ZERO,
 };
 
 /// The probe of pixel `index` of the band, whose first surface is `surface`.

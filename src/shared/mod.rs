@@ -618,6 +618,9 @@ structs! {
         table_weight: f32,
         table_bend: Vec2,
         table_scale: f32,
+        /// Written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
+        delta: Vec3,
+        light: Vec3,
     }
 
     /// Where a probe meets surfaces of its set, written by `reproject`.
@@ -626,9 +629,6 @@ structs! {
         count: u32,
         t: [f32; 8],
         triangle: [u32; 8],
-        /// Tiles only, written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
-        delta: Vec3,
-        light: Vec3,
     }
 
     /// Running sums of a pixel, compensated: the true sum is `x + x_carry` (Neumaier / TwoSum).

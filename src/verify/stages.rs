@@ -79,33 +79,36 @@ impl Staged {
         context.bench.run(stem, &self.case.inputs(), &self.case.scene.nodes, &self.step, buffers)
     }
 
-    /// The sums that a kernel adds to, which were zero, those of the step's batch, and the hits it leaves.
-    fn run_sums(&self, context: &mut Context, stem: &'static str) -> Result<(Vec<Sums>, Vec<Vec3>, Vec<Hits>)> {
+    /// The sums that a kernel adds to, which were zero, those of the step's batch, and the probes it leaves.
+    fn run_sums(&self, context: &mut Context, stem: &'static str) -> Result<(Vec<Sums>, Vec<Vec3>, Vec<Probe>)> {
         let surfaces = self.g_buffers();
         let sums = vec![Sums::default(); self.surfaces.len()];
         let batch_sums = vec![Vec3::ZERO; self.surfaces.len() * BATCHES as usize];
         // A pixel without a probe has no hits, whatever its list says.
         let lists = self.hits.iter().zip(&self.probes);
-        let lit = self.lit.iter().map(|lit| lit.unwrap_or_default());
-        let left = |((hits, probe), (delta, light)): ((&Hits, &Probe), (DVec3, DVec3))| {
-            let hits = if probe.t_min <= probe.t_max { *hits } else { STALE };
-            match stem {
-                "reuse" => Hits { delta: delta.as_vec3(), light: light.as_vec3(), ..hits },
-                _ => Hits { delta: STALE.delta, light: STALE.light, ..hits },
-            }
-        };
-        let hits: Vec<Hits> = lists.zip(lit).map(left).collect();
+        let hits: Vec<Hits> =
+            lists.map(|(hits, probe)| if probe.t_min <= probe.t_max { *hits } else { STALE }).collect();
+        let probes = if stem == "reuse" { self.lit_probes() } else { self.probes.clone() };
         let buffers: [(Slot, &[u8]); 5] = [
             (Slot::Surfaces, bytemuck::cast_slice(&surfaces)),
-            (Slot::Probes, bytemuck::cast_slice(&self.probes)),
+            (Slot::Probes, bytemuck::cast_slice(&probes)),
             (Slot::HitLists, bytemuck::cast_slice(&hits)),
             (Slot::RunningSums, bytemuck::cast_slice(&sums)),
             (Slot::BatchSums, bytemuck::cast_slice(&batch_sums)),
         ];
         let loaded = self.run(context, stem, &buffers)?;
         let batch = context.bench.read::<Vec3>(&loaded, Slot::BatchSums)?;
-        let hits = context.bench.read(&loaded, Slot::HitLists)?;
-        Ok((context.bench.read(&loaded, Slot::RunningSums)?, batch[self.batch()].to_vec(), hits))
+        let probes = context.bench.read(&loaded, Slot::Probes)?;
+        Ok((context.bench.read(&loaded, Slot::RunningSums)?, batch[self.batch()].to_vec(), probes))
+    }
+
+    /// The probes as `accumulate` leaves them.
+    fn lit_probes(&self) -> Vec<Probe> {
+        let with = |(probe, lit): (&Probe, &Option<(DVec3, DVec3)>)| {
+            let (delta, light) = lit.unwrap_or_default();
+            Probe { delta: delta.as_vec3(), light: light.as_vec3(), ..*probe }
+        };
+        self.probes.iter().zip(&self.lit).map(with).collect()
     }
 
     /// What a twin adds to each pixel.
@@ -115,7 +118,7 @@ impl Staged {
 }
 
 /// What an earlier sample may have left: hits of triangles that do not exist.
-const STALE: Hits = Hits { count: 99, t: [1.0; 8], triangle: [MISS; 8], delta: Vec3::ONE, light: Vec3::ONE };
+const STALE: Hits = Hits { count: 99, t: [1.0; 8], triangle: [MISS; 8] };
 
 /// A kernel on all cases of this program.
 ///
@@ -224,7 +227,8 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         let name = &staged.case.name;
         let surfaces = staged.g_buffers();
         // What an earlier sample may have left.
-        let probes = vec![Probe { t_max: 2.0, ..Probe::default() }; staged.probes.len()];
+        let stale = Probe { t_max: 2.0, stamp: 7, light: Vec3::ONE, ..Probe::default() };
+        let probes = vec![stale; staged.probes.len()];
         let buffers: [(Slot, &[u8]); 2] =
             [(Slot::Surfaces, bytemuck::cast_slice(&surfaces)), (Slot::Probes, bytemuck::cast_slice(&probes))];
         let loaded = staged.run(context, "sample", &buffers)?;
@@ -233,6 +237,7 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
             let exists = |p: &Probe| p.t_min <= p.t_max;
             verdict.words(found.stamp, twin.stamp, || at("stamp"));
+            verdict.require(found.light == Vec3::ZERO, || at("light"));
             verdict.words(found.group, twin.group, || at("group"));
             verdict.words(found.table_node, twin.table_node, || at("node"));
             verdict.compare(found.table_weight, twin.table_weight.into(), 1.0, || at("weight"));
@@ -321,7 +326,7 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     let mut lit = 0;
     for staged in staged {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());
-        let (sums, batch, hits) = staged.run_sums(context, "accumulate")?;
+        let (sums, batch, probes) = staged.run_sums(context, "accumulate")?;
         let twins = staged.contributions(|i| {
             let at = i as usize;
             let (surface, probe, hits) = (&staged.surfaces[at], &staged.probes[at], &staged.hits[at]);
@@ -341,7 +346,7 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         if inputs.features.reuse == 0 {
             continue;
         }
-        for (i, (found, twin)) in hits.iter().zip(&staged.lit).enumerate() {
+        for (i, (found, twin)) in probes.iter().zip(&staged.lit).enumerate() {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
             verdict.words(u32::from(found.light != Vec3::ZERO), twin.is_some().into(), || at("lit"));
             if let Some((delta, light)) = twin {
@@ -365,13 +370,8 @@ pub fn reuse(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     for staged in staged.iter().filter(|staged| staged.case.prepared.features.reuse != 0) {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());
         let (sums, batch, _) = staged.run_sums(context, "reuse")?;
-        let of_twin = |lit: &Option<(DVec3, DVec3)>| {
-            let (delta, light) = lit.unwrap_or_default();
-            Hits { delta: delta.as_vec3(), light: light.as_vec3(), ..Hits::default() }
-        };
-        let hits: Vec<Hits> = staged.lit.iter().map(of_twin).collect();
-        let stage = Stage { surfaces: &staged.surfaces, probes: &staged.probes };
-        let twins = staged.contributions(|i| twin_reuse(&inputs, &staged.step, i, &stage, &hits));
+        let stage = Stage { surfaces: &staged.surfaces, probes: &staged.lit_probes() };
+        let twins = staged.contributions(|i| twin_reuse(&inputs, &staged.step, i, &stage));
         for (i, (sums, twin)) in sums.iter().zip(&twins).enumerate() {
             let at = || format!("{name}, pixel {i}");
             let counts = (sums.samples, sums.covered, sums.invalid);

@@ -10,7 +10,7 @@ use std::{
         atomic::{AtomicUsize, Ordering},
     },
 };
-use translucent::{Projection, Renderer, Settings, ash::vk, verify::cases::portrait};
+use translucent::{Projection, Renderer, ash::vk, verify::cases::portrait};
 
 /// Number of the barrier that is dropped, and how many there were.
 static DROPPED: AtomicUsize = AtomicUsize::new(usize::MAX);
@@ -40,7 +40,6 @@ fn dropped_barriers_are_named() {
     let app = App::validated(wrap);
     let device = app.open();
     let (scene, settings) = portrait(Projection::Mis).expect("a valid scene");
-    let settings = Settings { reuse: 8, ..settings };
     let mut renderer = Renderer::new(&device, &scene, &settings).expect("the renderer is made");
     let mut image = |dropped: usize| {
         COUNT.store(0, Ordering::Relaxed);
@@ -54,9 +53,9 @@ fn dropped_barriers_are_named() {
     assert!(messages.is_empty() && barriers > 6, "{barriers} barriers: {messages:#?}");
 
     // Who reads what another has written is named; of kernels that also write to it, as `reflect` to the sums and
-    // `accumulate` to the hits, the validation layer (1.3.239) says nothing, and `resolve` comes in a submission of its
+    // `accumulate` to the probes, the validation layer (1.3.239) says nothing, and `resolve` comes in a submission of its
     // own, after a wait.
-    let kernels = ["sample", "reproject", "reuse"];
+    let kernels = ["sample", "reproject", "accumulate"];
     let mut named = [false; 3];
     // From the end, since validation repeats one kind of message ten times only.
     for dropped in (0..barriers).rev() {

@@ -105,8 +105,8 @@ mutants! {
     "shared_hit.glsl", "lost condition", "kernel.accumulate": " && probes[index].group == group" => "";
     "shared_hit.glsl", "sign", "kernel.accumulate": "hit - surfaces[surface_index(other)].position + delta" =>
         "hit - surfaces[surface_index(other)].position - delta";
-    "accumulate.comp", "lost condition", "kernel.accumulate": "REUSE != 0u && step_.ray_begin == 0u" => "REUSE == 0u";
-    "reuse.comp", "index", "kernel.reuse": "surface.position + hit_lists[other].delta" => "surface.position + hit_lists[index].delta";
+    "sample.comp", "lost term", "kernel.sample": "probe.light = vec3(0.0);" => "";
+    "reuse.comp", "index", "kernel.reuse": "surface.position + probes[other].delta" => "surface.position + probes[index].delta";
     "sample.comp", "sign", "kernel.sample": "probe.t_max = -b + half_chord;" => "probe.t_max = b + half_chord;";
     "sample.comp", "swapped branch", "kernel.sample":
         "technique == TECHNIQUE_U ? tangent : bitangent" => "technique == TECHNIQUE_U ? bitangent : tangent";
