@@ -43,7 +43,7 @@ const RAYS: usize = 4_000_000;
 const FEW: usize = 1 << 10;
 /// Distance, over L, beyond which a surface is out of sight: e^(-20/2) = 5e-5.
 const SIGHT: f64 = 20.0;
-/// Vertices closer than an internal unit over this are one.
+/// Vertices closer than an internal unit over this are one, and no sphere is smaller.
 const GRID: f64 = (1 << 20) as f64;
 
 /// 1 / a [1/internal unit] at the three vertices of each triangle, in their order; a set's entry of `lengths` is its L (>
@@ -137,7 +137,8 @@ fn inverse_radius(mesh: &Mesh, point: DVec3, normal: DVec3, length: f64, directi
         mean * (2.0 - mean)
     };
     let missed = (0..pairs).map(pair).sum::<f64>() / pairs as f64;
-    2.0 / (length * diameter(missed))
+    // Between the inner faces of two bodies that touch there is nothing; but 1 / a is to be a number.
+    (length * diameter(missed) / 2.0).max(1.0 / GRID).recip()
 }
 
 /// x with 1 - 2 (1 - (1 + x) e^(-x)) / x^2 = `missed`, 0 < missed <= 1.

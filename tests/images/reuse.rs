@@ -11,10 +11,11 @@ use translucent::{Model, Scene, Settings, scene::Environment};
 
 const SIDE: u32 = 24;
 
-/// A slab and a ball of two sets: edges, shadows, silhouettes and neighbours that share nothing lie within tiles.
+/// A step, of two bodies that touch, and a ball of another set: edges, shadows, silhouettes and neighbours that share nothing lie within tiles.
 fn still_life(sigma_s_prime: f64) -> Scene {
-    let mut slab = Mesh::default();
-    slab.cuboid(DVec3::new(-1.5, -1.5, -1.0), DVec3::new(1.2, 1.5, 0.0), 1);
+    let mut step = Mesh::default();
+    step.cuboid(DVec3::new(-1.5, -1.5, -1.0), DVec3::new(0.0, 1.5, 0.0), 1);
+    step.cuboid(DVec3::new(0.0, -1.5, -1.0), DVec3::new(1.5, 1.5, 0.5), 1);
     let materials = [matter([sigma_s_prime; 3], [0.02, 0.2, 0.6], 1.3), matter([9.0, 6.0, 3.0], [0.1; 3], 1.5), lamp()];
     let mut ball = Mesh::sphere(0.6, 4);
     ball.positions.iter_mut().for_each(|position| *position += DVec3::new(-0.7, 0.2, 0.8));
@@ -22,7 +23,7 @@ fn still_life(sigma_s_prime: f64) -> Scene {
     light.quad(DVec3::new(-2.0, 2.0, 2.0), DVec3::X, DVec3::Y);
     let eye = Eye { eye: DVec3::new(0.6, -1.0, 5.0), at: DVec3::ZERO, lens: 0.7 };
     let lights: Vec<_> = (0..4).map(|i| (sun(), DVec3::new(f64::from(i) - 2.0, 3.0, 2.0), DVec3::ZERO)).collect();
-    let mut scene = scene(&gltf(&[(slab, 0), (ball, 1), (light, 2)], &materials, &lights, &eye));
+    let mut scene = scene(&gltf(&[(step, 0), (ball, 1), (light, 2)], &materials, &lights, &eye));
     scene.environment = Environment::constant(DVec3::splat(0.2)).expect("a sky");
     scene
 }

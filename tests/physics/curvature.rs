@@ -50,3 +50,15 @@ fn open_surfaces_are_half_spaces() {
         assert!(inverse.max_element() < 1e-9, "{inverse}");
     }
 }
+
+/// Two bodies that share a face: between its two sides there is nothing, and yet every number is one.
+#[test]
+fn bodies_that_touch_have_finite_curvatures() {
+    let mesh = Mesh::cuboid(DVec3::ONE, 2);
+    let own = || (0..mesh.len()).map(|index| mesh.corners(index));
+    let corners: Vec<Corners> = own().chain(own().map(|t| t.map(|corner| corner + DVec3::X))).collect();
+    let found = of_mesh(&corners, 0.7, 64);
+    let most = found.iter().map(|inverse| inverse.max_element()).fold(0.0, f32::max);
+    assert!(found.iter().all(|inverse| inverse.is_finite() && inverse.min_element() > 0.0), "{most}");
+    assert!(most <= (1 << 20) as f32, "{most}");
+}
