@@ -64,7 +64,8 @@ float coordinate(Place place, uint key, uint batch, uint dimension) {
 // As `random_point`, at a place.
 vec2 point_at(Place place, uint key, uint batch, uint dimension, uint index) {
     if (REUSE == 0u) return random_point(key, batch, dimension, index);
-    uint first = dimension_key(key, batch, dimension + DIM_PLACE), second = dimension_key(key, batch, dimension + 1u + DIM_PLACE);
+    uint first = dimension_key(key, batch, dimension + DIM_PLACE);
+    uint second = dimension_key(key, batch, dimension + 1u + DIM_PLACE);
     uint at = shuffled(place.at, first);
     return vec2(
         unit(scramble(bitfieldReverse(index), dimension_key(key, batch, dimension)) ^ place_coordinate(at, 0u, first)),
