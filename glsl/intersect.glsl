@@ -172,5 +172,6 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
                 nodes_left = stack[--stack_size];
         }
     }
-    if (COUNT_STEPS != 0) atomicMax(counters[0], steps);
+    // Once for each ray that has a segment: `bench` counts how often.
+    if (COUNT_STEPS != 0 && steps != 0u) atomicMax(counters[0], steps);
 }

@@ -8,11 +8,19 @@
 //! to be sure.
 
 mod compare;
+mod count;
+mod instrument;
+mod limits;
 mod report;
+mod roofline;
 pub mod statistics;
 
 pub use compare::{Comparison, Difference, compare};
+pub use count::{Counts, count, rays_of};
+pub use instrument::Work;
+pub use limits::Limits;
 pub use report::{Report, Series};
+pub use roofline::{Bound, Line, Rays};
 
 use crate::{
     Error, Result,
@@ -79,7 +87,7 @@ pub fn run(
             report.add_host("render", ms(rendered));
             report.add_host("image", ms(whole - rendered));
             for times in timeline.kernels() {
-                report.add_kernel(times.kernel, times.count, times.total * 1e-6);
+                report.add_kernel(&times);
             }
         }
         report.counters = counters(&timeline.counters());
@@ -90,6 +98,17 @@ pub fn run(
     report.device_bytes = renderer.buffers().iter().map(|(_, bytes)| bytes).sum();
     report.peak_bytes = peak_bytes();
     Ok(report)
+}
+
+/// Adds to a report of this work what its kernels do ([`count`], one sample) and what the device gives at best
+/// ([`Limits::measure`]), neither of which its times have anything of.
+///
+/// # Errors
+/// As [`count`] and [`Limits::measure`].
+pub fn add_roofline(report: &mut Report, device: &Device, scene: &Scene, settings: &Settings) -> Result<()> {
+    report.counts = count(device, scene, settings, 1)?;
+    report.limits = Limits::measure(device)?;
+    Ok(())
 }
 
 /// What makes the numbers: version, hash of the kernels, device, driver. It may differ between runs that are compared.

@@ -1,7 +1,7 @@
 //! What a benchmark found, and its JSON.
 
-use super::{CONFIDENCE, Effort, statistics};
-use crate::{Error, Result};
+use super::{CONFIDENCE, Counts, Effort, Limits, Line, Rays, statistics};
+use crate::{Error, Result, timeline::KernelTimes};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -26,6 +26,10 @@ pub struct Report {
     pub executables: Value,
     /// What the hardware counted, mean of a dispatch in the last repeat; null where it counted nothing.
     pub counters: Value,
+    /// What each kernel did in a run that counted; empty where there was none.
+    pub counts: Vec<Counts>,
+    /// What the device gives at best, where that was measured.
+    pub limits: Option<Limits>,
     /// Of all buffers.
     pub device_bytes: u64,
     /// Most memory that the process had, where the system tells. On a software driver that is the device's as well.
@@ -40,6 +44,8 @@ pub struct Series {
     pub launches: u64,
     /// Milliseconds.
     pub times: Vec<f64>,
+    /// Shortest and longest dispatch of all repeats (ms); none for the host's, and in reports of older versions.
+    pub extremes: Option<[f64; 2]>,
 }
 
 impl Series {
@@ -48,8 +54,18 @@ impl Series {
         statistics::median(&self.times, CONFIDENCE)
     }
 
+    /// Mean of a dispatch, over all repeats (ms).
+    pub fn mean(&self) -> f64 {
+        self.times.iter().sum::<f64>() / (self.launches * self.times.len() as u64).max(1) as f64
+    }
+
     fn json(&self) -> Value {
-        let mut value = json!({ "name": self.name, "launches": self.launches, "timesMs": self.times });
+        let total: f64 = self.times.iter().sum();
+        let mut value =
+            json!({ "name": self.name, "launches": self.launches, "timesMs": self.times, "totalMs": total });
+        if let Some([shortest, longest]) = self.extremes {
+            value["dispatchMs"] = json!({ "mean": self.mean(), "min": shortest, "max": longest });
+        }
         if let Some(median) = self.median() {
             value["medianMs"] = median.value.into();
             value["intervalMs"] = json!([median.low, median.high]);
@@ -64,6 +80,11 @@ impl Series {
             name: value["name"].as_str()?.to_string(),
             launches: value["launches"].as_u64()?,
             times: times.map(|time| time.as_f64().filter(|ms| *ms >= 0.0)).collect::<Option<_>>()?,
+            extremes: [&value["dispatchMs"]["min"], &value["dispatchMs"]["max"]]
+                .map(Value::as_f64)
+                .into_iter()
+                .collect::<Option<Vec<f64>>>()
+                .and_then(|both| both.try_into().ok()),
         })
     }
 }
@@ -79,6 +100,8 @@ impl Report {
             kernels: vec![],
             executables: Value::Null,
             counters: Value::Null,
+            counts: vec![],
+            limits: None,
             device_bytes: 0,
             peak_bytes: None,
         }
@@ -88,8 +111,10 @@ impl Report {
         add(&mut self.host, name, 1, ms);
     }
 
-    pub(super) fn add_kernel(&mut self, name: &str, launches: u64, ms: f64) {
-        add(&mut self.kernels, name, launches, ms);
+    pub(super) fn add_kernel(&mut self, times: &KernelTimes) {
+        let series = add(&mut self.kernels, times.kernel, times.count, times.total * 1e-6);
+        let [shortest, longest] = series.extremes.unwrap_or([f64::INFINITY, 0.0]);
+        series.extremes = Some([shortest.min(times.min * 1e-6), longest.max(times.max * 1e-6)]);
     }
 
     /// Millions of pixel samples a second, by the median time of rendering.
@@ -122,6 +147,10 @@ impl Report {
             "kernels": series(&self.kernels),
             "executables": self.executables,
             "counters": self.counters,
+            "counts": self.counts.iter().map(Counts::json).collect::<Vec<_>>(),
+            "limits": self.limits.map(|limits| limits.json()),
+            "roofline": self.roofline().iter().map(Line::json).collect::<Vec<_>>(),
+            "rays": self.rays().iter().map(Rays::json).collect::<Vec<_>>(),
             "megasamplesPerSecond": rate.map(|rate| json!({
                 "median": rate.value, "interval": [rate.low, rate.high], "confidence": rate.confidence,
             })),
@@ -157,15 +186,22 @@ impl Report {
             kernels: series("kernels")?,
             executables: value["executables"].clone(),
             counters: value["counters"].clone(),
+            // Older reports have none of these two.
+            counts: value["counts"]
+                .as_array()
+                .map_or(Some(vec![]), |list| list.iter().map(Counts::from_json).collect())?,
+            limits: Limits::from_json(&value["limits"]),
             device_bytes: value["memory"]["deviceBytes"].as_u64()?,
             peak_bytes: value["memory"]["peakBytes"].as_u64(),
         })
     }
 }
 
-fn add(list: &mut Vec<Series>, name: &str, launches: u64, ms: f64) {
-    match list.iter_mut().find(|series| series.name == name) {
-        Some(series) => series.times.push(ms),
-        None => list.push(Series { name: name.into(), launches, times: vec![ms] }),
-    }
+fn add<'a>(list: &'a mut Vec<Series>, name: &str, launches: u64, ms: f64) -> &'a mut Series {
+    let place = list.iter().position(|series| series.name == name).unwrap_or_else(|| {
+        list.push(Series { name: name.into(), launches, times: vec![], extremes: None });
+        list.len() - 1
+    });
+    list[place].times.push(ms);
+    &mut list[place]
 }

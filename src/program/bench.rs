@@ -13,7 +13,10 @@ use std::{
 };
 use translucent::{
     Device, DeviceOptions, Settings,
-    bench::{self, CONFIDENCE, Comparison, Difference, Effort, MAX_REPEATS, Report, Series, compare, statistics},
+    bench::{
+        self, Bound, CONFIDENCE, Comparison, Difference, Effort, MAX_REPEATS, Report, Series, compare, rays_of,
+        statistics,
+    },
     image::{check_writable, write_whole},
     timeline::{Timeline, begin},
 };
@@ -45,6 +48,10 @@ pub struct Bench {
     /// kernels down.
     #[arg(long)]
     counters: bool,
+    /// Leave out what kernels do and how far they are from what the device gives at best, which take a slower sample with
+    /// counters and two small kernels.
+    #[arg(long)]
+    no_roofline: bool,
     /// Everything that was measured, as JSON.
     #[arg(short, long, value_name = "OUT.json")]
     output: Option<PathBuf>,
@@ -54,7 +61,7 @@ pub struct Bench {
     /// Say in which kernels two runs of the same work differ beyond noise. Exit status 0: in none; 1: in some; 2: they
     /// cannot be compared.
     #[arg(long, value_names = ["A.json", "B.json"], num_args = 2,
-          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "counters", "output"])]
+          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "counters", "no_roofline", "output"])]
     compare: Option<Vec<PathBuf>>,
     /// How sure it is that runs that do not differ are said not to, in per cent.
     #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "99", value_parser = percentage)]
@@ -104,7 +111,10 @@ impl Bench {
         let settings = Settings { seed: self.seed, timeline, ..self.method.settings(options.settings()) };
         let effort = Effort { samples: self.samples, warmup: self.warmup, repeat: self.repeat };
         let bar = self.bar();
-        let report = bench::run(&device, &scene, &settings, effort, &mut |done| bar.set_position(u64::from(done)))?;
+        let mut report = bench::run(&device, &scene, &settings, effort, &mut |done| bar.set_position(u64::from(done)))?;
+        if !self.no_roofline {
+            bench::add_roofline(&mut report, &device, &scene, &settings)?;
+        }
         bar.finish_and_clear();
         if let Some(output) = &self.output {
             write_whole(output, format!("{:#}\n", report.json()).as_bytes())?;
@@ -137,7 +147,46 @@ fn cells(name: &str, series: &Series, share: &str) -> Vec<String> {
         [significant(estimate.value), format!("{} to {}", significant(estimate.low), significant(estimate.high))]
     };
     let [median, interval] = series.median().map_or(["-".into(), "-".into()], between);
-    row([name, &series.launches.to_string(), &median, &interval, share])
+    let [mean, shortest, longest] = match series.extremes {
+        Some([shortest, longest]) => [series.mean(), shortest, longest].map(significant),
+        None => Default::default(),
+    };
+    row([name, &series.launches.to_string(), &median, &interval, share, &mean, &shortest, &longest])
+}
+
+/// What kernels do each second beside what the device gives at best.
+fn roofline(report: &Report) -> String {
+    let mut rows =
+        vec![row(["", "GB/s", "OF COPY", "GFLOP/s", "OF PEAK", "FLOP/BYTE", "BOUND BY", "OF ROOF", "MRAYS/s"])];
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    for line in report.roofline() {
+        let [memory, arithmetic] = line.shares.map_or(["-".into(), "-".into()], |shares| shares.map(percent));
+        let (bound, share) = match line.bound() {
+            Some((Bound::Memory, share)) => ("memory", percent(share)),
+            Some((Bound::Arithmetic, share)) => ("arithmetic", percent(share)),
+            None => ("-", "-".into()),
+        };
+        let intensity = if line.intensity.is_finite() { significant(line.intensity) } else { "-".into() };
+        let rays = rays_of(&line.kernel).filter(|_| line.rays > 0.0);
+        let rays = rays.map_or(String::new(), |kind| format!("{} {kind}", significant(line.rays * 1e-6)));
+        let [bytes, flops] = [line.bandwidth, line.flops].map(|rate| significant(rate * 1e-9));
+        rows.push(row([&line.kernel, &bytes, &memory, &flops, &arithmetic, &intensity, bound, &share, &rays]));
+    }
+    let mut text = aligned(&rows);
+    if let Some(limits) = report.limits {
+        // Text that cannot be written to a string does not exist; so below.
+        let _ = writeln!(
+            text,
+            "\nat best: {} GB/s, copying {} MB; {} GFLOP/s of f32",
+            significant(limits.bandwidth * 1e-9),
+            significant(limits.copied as f64 * 1e-6),
+            significant(limits.peak * 1e-9)
+        );
+    }
+    for rays in report.rays() {
+        let _ = writeln!(text, "{} rays: {} Mrays/s", rays.kind, significant(rays.rate * 1e-6));
+    }
+    text
 }
 
 fn text(report: &Report) -> String {
@@ -145,13 +194,17 @@ fn text(report: &Report) -> String {
     let mut text = format!("START-UP [ms]: {}\n\n", start.join(", "));
     let median = |series: &Series| series.median().map_or(0.0, |median| median.value);
     let all: f64 = report.kernels.iter().map(median).sum();
-    let mut rows = vec![row(["", "LAUNCHES", "MEDIAN [ms]", "INTERVAL [ms]", "SHARE"])];
+    let mut rows = vec![row(["", "LAUNCHES", "MEDIAN [ms]", "INTERVAL [ms]", "SHARE", "DISPATCH [ms]", "MIN", "MAX"])];
     let mut kernels: Vec<&Series> = report.kernels.iter().collect();
     kernels.sort_by(|a, b| median(b).total_cmp(&median(a)));
     let share = |series: &Series| if all > 0.0 { format!("{:.1} %", 100.0 * median(series) / all) } else { "-".into() };
     rows.extend(kernels.iter().map(|series| cells(&series.name, series, &share(series))));
     rows.extend(report.host.iter().map(|series| cells(&format!("host: {}", series.name), series, "")));
     text.push_str(&aligned(&rows));
+    if !report.counts.is_empty() {
+        text.push('\n');
+        text.push_str(&roofline(report));
+    }
     let intervals = report.host.first().and_then(Series::median).map_or(0.0, |median| median.confidence);
     let Effort { repeat, warmup, .. } = report.effort;
     // Text that cannot be written to a string does not exist.

@@ -34,15 +34,19 @@ impl Renderer {
             }
         }
         let each = (SUBMISSION / u64::from(leaves)).max(1) as usize;
-        let Renderer { recorder, kernels, bindings, .. } = self;
-        let recorder = own(recorder)?;
+        let work = Work { pixels: leaves, ..Work::default() };
         for steps in steps.chunks(each) {
+            let Renderer { recorder, kernels, bindings, .. } = &mut *self;
+            let recorder = own(recorder)?;
             recorder.begin()?;
             for step in steps {
                 kernels.irradiance.iter().for_each(|kernel| recorder.dispatch(kernel, bindings, leaves, step));
             }
             recorder.submit_and_wait()?;
+            self.note("cloud", work.clone());
         }
+        let Renderer { recorder, kernels, bindings, .. } = &mut *self;
+        let recorder = own(recorder)?;
         recorder.begin()?;
         let mut node = leaves / 2;
         while node > 0 {
@@ -52,7 +56,7 @@ impl Renderer {
         }
         recorder.submit_and_wait()?;
         self.lit = true;
-        self.note("cloud", Work { pixels: leaves, ..Work::default() });
+        self.note("cloud", work);
         Ok(())
     }
 }

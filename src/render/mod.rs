@@ -51,10 +51,16 @@ macro_rules! kernels {
 
         impl Kernels {
             /// Side by side: a driver translates each on one core.
-            fn new(device: &Device, prepared: &Prepared, workgroup: u32) -> Result<Kernels> {
-                let mut made = SPIRV.par_iter().map(|&(stem, spirv)| match plan::needs(prepared, stem).0 {
-                    true => Kernel::shared(device, stem, spirv, &prepared.features, workgroup).map(Some),
-                    false => Ok(None),
+            fn new(device: &Device, prepared: &Prepared, workgroup: u32, others: &Modules) -> Result<Kernels> {
+                let mut made = SPIRV.par_iter().map(|&(stem, spirv)| {
+                    let other = others.iter().find(|(named, _)| *named == stem);
+                    match (plan::needs(prepared, stem).0, other) {
+                        (false, _) => Ok(None),
+                        (true, None) => Kernel::shared(device, stem, spirv, &prepared.features, workgroup).map(Some),
+                        (true, Some((_, spirv))) => {
+                            Kernel::new(&Layout::new(device)?, stem, spirv, &prepared.features, workgroup).map(Some)
+                        }
+                    }
                 }).collect::<Result<Vec<_>>>()?.into_iter();
                 Ok(Kernels { $($stem: made.next().expect("one for each"),)* })
             }
@@ -72,6 +78,9 @@ macro_rules! kernels {
 kernels!(
     begin, irradiance, cluster, primary, sample, reproject, accumulate, reuse, gather, reflect, single, count, resolve
 );
+
+/// SPIR-V that takes the place of kernels', by stem.
+pub(crate) type Modules = [(&'static str, Vec<u8>)];
 
 /// How far a render is.
 #[derive(Clone, Copy, Debug)]
@@ -151,12 +160,31 @@ impl Renderer {
         settings: &Settings,
         buffers: Vec<(Slot, Buffer)>,
     ) -> Result<Renderer> {
-        Renderer::with_features(device, scene, settings, |_| {}, buffers)
+        Renderer::with_features(device, scene, settings, |_| {}, buffers, &[])
     }
 
     /// As [`Renderer::new`], with traversal steps counted.
     pub fn counting(device: &Device, scene: &Scene, settings: &Settings) -> Result<Renderer> {
-        Renderer::with_features(device, scene, settings, |prepared| prepared.features.counters = 1, vec![])
+        Renderer::with_features(device, scene, settings, |prepared| prepared.features.counters = 1, vec![], &[])
+    }
+
+    /// As [`Renderer::counting`], with other modules, which count in a buffer of their own; its first word is that of
+    /// [`Renderer::largest_step_count`].
+    pub(crate) fn instrumented(
+        device: &Device,
+        scene: &Scene,
+        settings: &Settings,
+        modules: &Modules,
+        counters: Buffer,
+    ) -> Result<Renderer> {
+        let change = |prepared: &mut Prepared| prepared.features.counters = 1;
+        Renderer::with_features(device, scene, settings, change, vec![(Slot::Counters, counters)], modules)
+    }
+
+    /// The words of the counters, those of [`Renderer::instrumented`] after the first; none without.
+    pub(crate) fn counters(&self) -> Result<Vec<u32>> {
+        let Some(counters) = self.buffer(Slot::Counters) else { return Ok(vec![]) };
+        Ok(bytemuck::pod_collect_to_vec(&download(&self.device, counters, counters.bytes())?))
     }
 
     fn with_features(
@@ -165,6 +193,7 @@ impl Renderer {
         settings: &Settings,
         change: impl FnOnce(&mut Prepared),
         given: Vec<(Slot, Buffer)>,
+        modules: &Modules,
     ) -> Result<Renderer> {
         if !(1..=128).contains(&settings.workgroup) {
             return Err(Error::setting("workgroup", format!("{} is not between 1 and 128", settings.workgroup)));
@@ -176,7 +205,7 @@ impl Renderer {
         let limits = Limits::of(device);
         let bands = bands::split(limits, &prepared, settings)?;
         budget::check(limits, scene, &prepared, &bands)?;
-        Renderer::with_bands(device, scene, settings, prepared, given, bands)
+        Renderer::with_bands(device, scene, settings, prepared, given, bands, modules)
     }
 
     fn with_bands(
@@ -186,9 +215,10 @@ impl Renderer {
         prepared: Prepared,
         mut given: Vec<(Slot, Buffer)>,
         bands: Vec<Band>,
+        modules: &Modules,
     ) -> Result<Renderer> {
         let span = timeline::begin(&settings.timeline, "pipelines");
-        let kernels = Kernels::new(device, &prepared, settings.workgroup)?;
+        let kernels = Kernels::new(device, &prepared, settings.workgroup, modules)?;
         drop(span);
         let _span = timeline::begin(&settings.timeline, "upload");
         let recording = settings.recording;

@@ -124,7 +124,7 @@ impl Renderer {
         for band in bands.iter_mut().filter(|band| band.film == Film::OnDevice) {
             band.roll_back(begin.unwrap_or(0));
         }
-        let resumed = Renderer::with_bands(device, scene, &settings, prepared, vec![], bands)?;
+        let resumed = Renderer::with_bands(device, scene, &settings, prepared, vec![], bands, &[])?;
         Ok(Renderer { begin, adaptive, authored, keep_every, ..resumed })
     }
 

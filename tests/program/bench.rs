@@ -1,11 +1,16 @@
 //! `bench`: intervals that hold what they say, runs that are told apart, and what the program writes.
 
 use crate::{Folder, stderr};
+use glam::{DAffine3, DVec3};
 use serde_json::{Value, json};
 use std::fs;
-use translucent::bench::{
-    Effort, Report, Series, compare,
-    statistics::{median, ratio},
+use translucent::{
+    CameraChoice, Device, DeviceOptions, Model, Scene, Settings,
+    bench::{
+        Bound, Counts, Effort, Limits, Report, Series, Work, compare, count,
+        statistics::{median, ratio},
+    },
+    scene::{Camera, Lens, Light, LightKind, Material, Mesh},
 };
 
 /// Numbers between 0 and 1: splitmix64 (G. Steele, D. Lea, C. Flood 2014).
@@ -32,7 +37,7 @@ const KERNELS: [(&str, f64); 5] =
 
 /// A report whose kernels take these times, up to noise.
 fn synthetic(random: &mut Random, repeat: usize, factor: impl Fn(&str) -> f64) -> Report {
-    let series = |name: &str, times| Series { name: name.into(), launches: 16, times };
+    let series = |name: &str, times| Series { name: name.into(), launches: 16, times, extremes: None };
     let kernels: Vec<_> =
         KERNELS.iter().map(|(name, ms)| series(name, random.times(repeat, ms * factor(name)))).collect();
     Report {
@@ -44,6 +49,8 @@ fn synthetic(random: &mut Random, repeat: usize, factor: impl Fn(&str) -> f64) -
         kernels,
         executables: Value::Null,
         counters: Value::Null,
+        counts: vec![],
+        limits: None,
         device_bytes: 1 << 20,
         peak_bytes: None,
     }
@@ -209,6 +216,15 @@ fn the_program_measures_what_it_says() {
     // Where there is nothing to count or tell, nothing is made up.
     assert!(report.counters.is_null() || report.counters.is_array());
     assert!(report.executables.is_null() || report.executables.is_object());
+    // Each kernel's work and rays, and limits that are numbers: where there are timestamps, all or nothing.
+    assert_eq!(report.counts.len(), report.kernels.len());
+    assert_eq!(report.limits.is_some(), !report.kernels.is_empty());
+    assert!(report.limits.is_none_or(|limits| limits.bandwidth > 0.0 && limits.peak > 0.0));
+    assert!(report.kernels.is_empty() || said.contains("camera rays: ") && said.contains("OF ROOF"), "{said}");
+    for series in &report.kernels {
+        let [shortest, longest] = series.extremes.expect("kernels have dispatches");
+        assert!(shortest <= series.mean() && series.mean() <= longest, "{series:?}");
+    }
     assert!(report.device_bytes > 0 && report.rate().is_some_and(|rate| rate.value > 0.0));
     if cfg!(target_os = "linux") {
         // At least what the buffers of a software driver take.
@@ -226,4 +242,109 @@ fn the_program_measures_what_it_says() {
         assert_eq!(series.launches, launches, "{}", series.name);
         assert!(said.lines().any(|line| line.starts_with(&series.name)), "{said}");
     }
+}
+
+/// A square of 2 x 2 m that faces a camera which sees 4 x 4 m of it and its surroundings, under lights that shine in these
+/// directions.
+fn square(material: Material, lights: &[DVec3]) -> Scene {
+    let positions = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+    let mesh = Mesh {
+        name: "square",
+        positions: &positions,
+        indices: &[0, 1, 2, 0, 2, 3],
+        transform: DAffine3::IDENTITY,
+        ..Mesh::default()
+    };
+    let mut scene = Scene::from_meshes(&[mesh], vec![material], vec![]).expect("a scene");
+    let light = |&direction: &DVec3| Light {
+        name: "sun".into(),
+        position: DVec3::ZERO,
+        direction,
+        intensity: DVec3::ONE,
+        kind: LightKind::Directional,
+        range: None,
+    };
+    scene.lights = lights.iter().map(light).collect();
+    let lens = Lens::Orthographic { xmag: 2.0, ymag: 2.0 };
+    scene.cameras = vec![Camera::new("front", DVec3::new(0.0, 0.0, 3.0), -DVec3::Z, DVec3::Y, lens)];
+    scene
+}
+
+#[test]
+fn what_is_counted_is_what_kernels_do() {
+    let device = Device::open(&DeviceOptions::default()).expect("a device");
+    if !device.has_timestamps() {
+        println!("skipped: the device has no timestamps");
+        return;
+    }
+    const PIXELS: u64 = 16 * 16;
+    // Pixels are squares of 1/4 m, so that an eighth by an eighth of them lies within the square, wherever samples fall.
+    const COVERED: u64 = 8 * 8;
+    let counted = |material: &Material, lights: &[DVec3]| {
+        let camera = CameraChoice::Name("front".into());
+        let settings = Settings { resolution: Some((16, 16)), camera, model: Model::Standard, ..Settings::default() };
+        count(&device, &square(material.clone(), lights), &settings, 3).expect("it is counted")
+    };
+    let find = |counts: &[Counts], kernel: &str| {
+        let found = counts.iter().find(|counts| counts.kernel == kernel);
+        found.map_or(Work::default(), |counts| counts.work)
+    };
+    let (front, behind) = (-DVec3::Z, DVec3::Z);
+    let opaque = Material::default();
+    let counts = counted(&opaque, &[front, behind]);
+    // Once for each of two submissions: the word `samples` is read and written.
+    assert_eq!(find(&counts, "count"), Work { loaded: 2 * 4 * PIXELS, stored: 2 * 4 * PIXELS, flops: 0, rays: 0 });
+    // Of each pixel: a Sums of 60 bytes, and twice 8 batches of 12; a Pixel of 48. Operations: 3 components of two quotients
+    // and a sum for each of two layers; for each batch 3 of quotient and sum, 3 of quotient and difference, 3 of one quotient,
+    // two products and a sum; 4 + 6 of the variance and 1 of alpha.
+    let resolve = Work { loaded: (60 + 2 * 8 * 12) * PIXELS, stored: 48 * PIXELS, flops: 221 * PIXELS, rays: 0 };
+    assert_eq!(find(&counts, "resolve"), resolve);
+    // Three samples, and the pixels' centres for the image.
+    assert_eq!(find(&counts, "primary").rays, 4 * PIXELS);
+    // Of two lights the one in front of the surface.
+    assert_eq!(find(&counts, "reflect").rays, 3 * COVERED);
+    assert_eq!(find(&counted(&opaque, &[behind]), "reflect").rays, 0);
+    assert_eq!(find(&counted(&opaque, &[front, front]), "reflect").rays, 2 * 3 * COVERED);
+
+    let marble = Material::from_preset("marble").expect("a preset");
+    let lit = counted(&marble, &[front]);
+    let [probes, shadows] = ["reproject", "accumulate"].map(|kernel| find(&lit, kernel).rays);
+    assert!(0 < shadows && shadows <= probes && probes <= 3 * COVERED, "{shadows} of {probes}");
+    let dark = counted(&marble, &[behind]);
+    assert_eq!(find(&dark, "accumulate").rays, 0);
+    assert_eq!(find(&dark, "reproject").rays, probes);
+}
+
+#[test]
+fn the_roofline_is_the_lower_of_two_limits() {
+    let mut random = Random(5);
+    let mut report = synthetic(&mut random, 1, |_| 1.0);
+    report.limits = Some(Limits { bandwidth: 10e9, peak: 100e9, copied: 1 << 20 });
+    let counts = |kernel: &str, work| Counts { kernel: kernel.into(), launches: 2, work };
+    // 16 launches of a repeat are eight times those two.
+    let [slow, quick] =
+        [Work { loaded: 800, stored: 200, flops: 100, rays: 7 }, Work { flops: 50_000, ..Work::default() }];
+    report.counts =
+        vec![counts("primary", Work { flops: 1000, ..slow }), counts("sample", slow), counts("resolve", quick)];
+    let lines = report.roofline();
+    let seconds = |name: &str| {
+        let series = report.kernels.iter().find(|series| series.name == name).expect("it is there");
+        series.times[0] * 1e-3
+    };
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+    for (line, work, intensity, bound) in [
+        (&lines[0], [8000.0, 8000.0], 1.0, Bound::Memory),
+        (&lines[1], [8000.0, 800.0], 0.1, Bound::Memory),
+        (&lines[2], [0.0, 400_000.0], f64::INFINITY, Bound::Arithmetic),
+    ] {
+        let time = seconds(&line.kernel);
+        assert!(near(line.flops, work[1] / time) && (line.intensity == intensity || near(line.intensity, intensity)));
+        let roof = (intensity * 10e9).min(100e9);
+        let (found, share) = line.bound().expect("there are limits");
+        assert_eq!(found, bound);
+        assert!(near(share, line.flops / roof), "{line:?}");
+    }
+    let rays = report.rays();
+    assert_eq!(rays.iter().map(|rays| (rays.kind, rays.count)).collect::<Vec<_>>(), [("camera", 56.0)]);
+    assert!(near(rays[0].rate, 56.0 / seconds("primary")));
 }
