@@ -13,6 +13,7 @@ mod instrument;
 mod limits;
 mod report;
 mod roofline;
+mod scaling;
 pub mod statistics;
 
 pub use compare::{Comparison, Difference, compare};
@@ -21,6 +22,7 @@ pub use instrument::Work;
 pub use limits::Limits;
 pub use report::{Report, Series};
 pub use roofline::{Bound, Line, Rays};
+pub use scaling::{Axis, Point, Scaling, scaling, scalings_csv, scalings_json};
 
 use crate::{
     Error, Result,

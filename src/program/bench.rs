@@ -5,6 +5,7 @@ use super::{
     scene::{Method, Subject},
     tables::{aligned, row, significant},
 };
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     fmt::Write,
@@ -12,10 +13,10 @@ use std::{
     process::ExitCode,
 };
 use translucent::{
-    Device, DeviceOptions, Settings,
+    Device, DeviceOptions, Scene, Settings,
     bench::{
-        self, Bound, CONFIDENCE, Comparison, Difference, Effort, MAX_REPEATS, Report, Series, compare, rays_of,
-        statistics,
+        self, Axis, Bound, CONFIDENCE, Comparison, Difference, Effort, MAX_REPEATS, Point, Report, Scaling, Series,
+        compare, rays_of, scalings_csv, scalings_json, statistics,
     },
     image::{check_writable, write_whole},
     timeline::{Timeline, begin},
@@ -52,8 +53,17 @@ pub struct Bench {
     /// counters and two small kernels.
     #[arg(long)]
     no_roofline: bool,
-    /// Everything that was measured, as JSON.
-    #[arg(short, long, value_name = "OUT.json")]
+    /// How time grows with what is named, in place of the rest: pixels and samples of the scene, triangles of a sphere,
+    /// materials of 64 spheres, point lights around the scene. Minutes on a processor.
+    #[arg(long, value_name = "all|resolution|samples|triangles|materials|lights", value_delimiter = ',',
+          value_parser = axes(), conflicts_with_all = ["samples", "repeat", "warmup", "counters", "no_roofline", "compare"])]
+    scaling: Vec<Vec<Axis>>,
+    /// Values of each of --scaling, in place of its own.
+    #[arg(long, value_name = "N,...", value_delimiter = ',', requires = "scaling",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    values: Vec<u32>,
+    /// Everything that was measured, as JSON; with --scaling JSON or CSV.
+    #[arg(short, long, value_name = "OUT.json|.csv")]
     output: Option<PathBuf>,
     /// No progress.
     #[arg(long)]
@@ -61,7 +71,7 @@ pub struct Bench {
     /// Say in which kernels two runs of the same work differ beyond noise. Exit status 0: in none; 1: in some; 2: they
     /// cannot be compared.
     #[arg(long, value_names = ["A.json", "B.json"], num_args = 2,
-          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "counters", "no_roofline", "output"])]
+          conflicts_with_all = ["file", "samples", "repeat", "warmup", "seed", "device", "counters", "no_roofline", "scaling", "values", "output"])]
     compare: Option<Vec<PathBuf>>,
     /// How sure it is that runs that do not differ are said not to, in per cent.
     #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "99", value_parser = percentage)]
@@ -70,6 +80,14 @@ pub struct Bench {
     #[arg(long, value_name = "PERCENT", requires = "compare", default_value = "0",
           value_parser = arguments::not_negative)]
     least: f64,
+}
+
+fn axes() -> impl TypedValueParser<Value = Vec<Axis>> {
+    let names = Axis::NAMES.map(|(_, name)| name).into_iter().chain(["all"]);
+    PossibleValuesParser::new(names).map(|text| {
+        let all = Axis::NAMES.into_iter().filter(|(_, name)| text == "all" || *name == text);
+        all.map(|(axis, _)| axis).collect()
+    })
 }
 
 fn percentage(text: &str) -> Result<f64, String> {
@@ -88,8 +106,10 @@ impl Bench {
 
     fn measure(&self, options: &Subject) -> Result<ExitCode, Failure> {
         if let Some(output) = &self.output {
-            if !output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
-                return Err(Failure::input(format!("{}: its name must end in .json", output.display())));
+            let ends = |end: &str| output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(end));
+            if !ends("json") && (self.scaling.is_empty() || !ends("csv")) {
+                let wanted = if self.scaling.is_empty() { ".json" } else { ".json or .csv" };
+                return Err(Failure::input(format!("{}: its name must end in {wanted}", output.display())));
             }
             check_writable(output)?;
             options.keep_from(output)?;
@@ -109,8 +129,11 @@ impl Bench {
         }
         drop(opening);
         let settings = Settings { seed: self.seed, timeline, ..self.method.settings(options.settings()) };
+        if !self.scaling.is_empty() {
+            return self.scale(&device, &scene, &settings);
+        }
         let effort = Effort { samples: self.samples, warmup: self.warmup, repeat: self.repeat };
-        let bar = self.bar();
+        let bar = self.bar(u64::from(self.warmup) + u64::from(self.repeat), "repeats");
         let mut report = bench::run(&device, &scene, &settings, effort, &mut |done| bar.set_position(u64::from(done)))?;
         if !self.no_roofline {
             bench::add_roofline(&mut report, &device, &scene, &settings)?;
@@ -123,12 +146,38 @@ impl Bench {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn bar(&self) -> ProgressBar {
+    fn scale(&self, device: &Device, scene: &Scene, settings: &Settings) -> Result<ExitCode, Failure> {
+        let mut axes: Vec<Axis> = vec![];
+        self.scaling.iter().flatten().for_each(|axis| {
+            if !axes.contains(axis) {
+                axes.push(*axis);
+            }
+        });
+        let values = |axis: Axis| if self.values.is_empty() { axis.values() } else { &self.values };
+        let bar = self.bar(axes.iter().map(|axis| values(*axis).len() as u64).sum(), "points");
+        let mut scalings = vec![];
+        for axis in axes {
+            scalings.push(bench::scaling(device, scene, settings, axis, values(axis), &mut |_| bar.inc(1))?);
+        }
+        bar.finish_and_clear();
+        if let Some(output) = &self.output {
+            let csv = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+            let text = match csv {
+                true => scalings_csv(&scalings),
+                false => format!("{:#}\n", scalings_json(device, &scalings)),
+            };
+            write_whole(output, text.as_bytes())?;
+        }
+        print(&scalings.iter().map(scaled).collect::<Vec<_>>().join("\n"))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn bar(&self, count: u64, what: &str) -> ProgressBar {
         if self.quiet {
             return ProgressBar::hidden();
         }
-        let bar = ProgressBar::new(u64::from(self.warmup) + u64::from(self.repeat));
-        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} repeats  {eta} left");
+        let bar = ProgressBar::new(count);
+        let style = ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {what}  {{eta}} left"));
         style.map_or(bar.clone(), |style| bar.with_style(style))
     }
 
@@ -222,6 +271,53 @@ fn text(report: &Report) -> String {
         let _ = write!(text, ", process {} MB at the peak", megabytes(peak));
     }
     text + "\n"
+}
+
+/// A table of one axis: milliseconds, of kernels those of a sample.
+fn scaled(run: &Scaling) -> String {
+    let mut kernels: Vec<&str> = vec![];
+    for (name, _) in run.points.iter().flat_map(|point| &point.kernels) {
+        if !kernels.contains(&name.as_str()) {
+            kernels.push(name);
+        }
+    }
+    // What is varied comes first, and once.
+    let sizes: [(&str, fn(&Point) -> u64); 2] =
+        [("triangles", |point| point.triangles), ("samples", |point| point.samples.into())];
+    let sizes = || sizes.iter().filter(|(name, _)| *name != run.axis.name());
+    let head = |name: &str| name.to_uppercase();
+    let mut rows = vec![row([&head(run.axis.name())])];
+    rows[0].extend(sizes().map(|(name, _)| head(name)));
+    rows[0].extend(row(["SCENE [ms]", "RENDERER", "SAMPLE"]));
+    rows[0].extend(kernels.iter().map(|name| name.to_string()));
+    for point in &run.points {
+        let mut cells = row([&point.value.to_string()]);
+        cells.extend(sizes().map(|(_, size)| size(point).to_string()));
+        cells.push(point.scene.map_or("-".into(), significant));
+        cells.extend([point.renderer, point.sample()].map(significant));
+        cells.extend(kernels.iter().map(|name| {
+            let found = point.kernels.iter().find(|(named, _)| named == name);
+            found.map_or("-".into(), |(_, ms)| significant(ms / f64::from(point.samples)))
+        }));
+        rows.push(cells);
+    }
+    let mut text = aligned(&rows);
+    let grown = match run.axis {
+        Axis::Resolution => "pixels",
+        other => other.name(),
+    };
+    if let (Some(exponent), Some(ratio)) = (run.exponent(), run.ratio()) {
+        // Text that cannot be written to a string does not exist; so below.
+        let _ = writeln!(
+            text,
+            "time of rendering: {grown} to the power of {exponent:.2}; the last takes {} times as long as the first",
+            significant(ratio)
+        );
+    }
+    for (value, why) in &run.skipped {
+        let _ = writeln!(text, "{value}: left out: {why}");
+    }
+    text
 }
 
 fn compared(comparison: &Comparison) -> String {

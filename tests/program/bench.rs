@@ -7,7 +7,7 @@ use std::fs;
 use translucent::{
     CameraChoice, Device, DeviceOptions, Model, Scene, Settings,
     bench::{
-        Bound, Counts, Effort, Limits, Report, Series, Work, compare, count,
+        Axis, Bound, Counts, Effort, Limits, Point, Report, Scaling, Series, Work, compare, count, scalings_csv,
         statistics::{median, ratio},
     },
     scene::{Camera, Lens, Light, LightKind, Material, Mesh},
@@ -347,4 +347,66 @@ fn the_roofline_is_the_lower_of_two_limits() {
     let rays = report.rays();
     assert_eq!(rays.iter().map(|rays| (rays.kind, rays.count)).collect::<Vec<_>>(), [("camera", 56.0)]);
     assert!(near(rays[0].rate, 56.0 / seconds("primary")));
+}
+
+#[test]
+fn scaling_varies_what_it_says() {
+    let folder = Folder::new("scaling");
+    let bench = "bench SPOT --model standard --resolution 24x16 --environment constant:1,1,1 --quiet --scaling";
+    let said = folder.done(&format!("{bench} lights,materials,triangles --values 2,5 -o a.json"));
+    let report: Value = serde_json::from_slice(&fs::read(folder.join("a.json")).expect("written")).expect("JSON");
+    let runs = report["scalings"].as_array().expect("an array");
+    let all = |name: &str| {
+        runs.iter()
+            .map(|run| run["points"].as_array().expect("points").iter().map(|p| p[name].clone()).collect())
+            .collect::<Vec<Vec<Value>>>()
+    };
+    assert_eq!(runs.iter().map(|run| &run["axis"]).collect::<Vec<_>>(), ["lights", "materials", "triangles"]);
+    // A sphere has 12 triangles at least, 64 spheres of 300 each.
+    assert_eq!(all("value"), [[json!(2), json!(5)], [json!(2), json!(5)], [json!(12), json!(12)]]);
+    assert_eq!(all("triangles")[1], [json!(64 * 300), json!(64 * 300)]);
+    assert!(all("pixels").iter().flatten().all(|pixels| *pixels == 24 * 16));
+    assert!(said.contains("LIGHTS") && said.contains("MATERIALS") && said.contains("TRIANGLES"), "{said}");
+    folder.done(&format!("{bench} resolution,samples --values 8,16 -o a.csv"));
+    let csv = fs::read_to_string(folder.join("a.csv")).expect("written");
+    let fields = |line: &str| line.split(',').map(String::from).collect::<Vec<_>>();
+    let whole: Vec<_> = csv.lines().skip(1).map(fields).filter(|fields| fields[7].is_empty()).collect();
+    let sizes: Vec<_> = whole.iter().map(|fields| [&fields[0], &fields[1], &fields[3], &fields[4]]).collect();
+    assert_eq!(
+        sizes,
+        [
+            ["resolution", "8", "64", "4"],
+            ["resolution", "16", "256", "4"],
+            ["samples", "8", "384", "8"],
+            ["samples", "16", "384", "16"]
+        ]
+    );
+}
+
+#[test]
+fn the_exponent_is_that_of_a_power() {
+    let point = |value: u64, render: f64| Point {
+        value,
+        triangles: 1,
+        pixels: value * value,
+        samples: 1,
+        scene: None,
+        renderer: 1.0,
+        render,
+        kernels: vec![("primary".into(), render)],
+        device_bytes: 4,
+    };
+    let points = |power: f64| [10, 30, 500].map(|value| point(value, 0.7 * (value as f64).powf(power))).to_vec();
+    let near = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() < 1e-12 * b.abs().max(1.0));
+    for power in [0.0, 0.3, 1.0, 2.0] {
+        let samples = Scaling { axis: Axis::Samples, points: points(power), skipped: vec![] };
+        assert!(near(samples.exponent(), power) && near(samples.ratio(), 50f64.powf(power)), "{samples:?}");
+        // Against pixels, not their root.
+        let resolution = Scaling { axis: Axis::Resolution, ..samples };
+        assert!(near(resolution.exponent(), power / 2.0), "{resolution:?}");
+    }
+    let one = Scaling { axis: Axis::Lights, points: vec![point(1, 1.0)], skipped: vec![] };
+    assert_eq!((one.exponent(), one.ratio()), (None, Some(1.0)));
+    // Two rows, whole and kernel, below the head.
+    assert_eq!(scalings_csv(&[one]).lines().count(), 3);
 }
