@@ -144,8 +144,9 @@ void main() {
         own_value = has_model(local, MODEL_DIRECTIONAL);
         // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
         float weight = total * max(1.0, float(count) / float(MAX_HITS));
-        // The tile's pixels bring their own values of the hit, and divide by all of them.
-        factor = REUSE != 0u ? vec3(weight) : (own_value ? vec3(given) : f) * (weight / (f.x + f.y + f.z));
+        weight /= f.x + f.y + f.z;
+        // The tile's pixels bring their own values of the hit.
+        factor = REUSE != 0u ? vec3(weight) : (own_value ? vec3(given) : f) * weight;
     }
 
     vec3 n = s.side * geometric_normal(triangles[lit]);
@@ -169,8 +170,11 @@ void main() {
     if (REUSE != 0u && !has_model(m, MODEL_LAMBERT)) {
         if (has_texture(TEXTURE_BASE_COLOR)) entering *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb;
         if (entering == vec3(0.0)) return;
-        probes[index].delta = delta;
-        probes[index].light += entering * factor / tile_value(tile_of(view, place, batch), view.crop_width, m, index, delta);
+        float r2 = dot(delta, delta);
+        probes[index].hit = position;
+        probes[index].hit_r2 = r2;
+        factor *= tile_share(tile_of(view, place, batch), view.crop_width, m, index, position, r2);
+        probes[index].light += entering * factor;
         return;
     }
 

@@ -113,6 +113,24 @@ float table_unbent(float s, float bend) {
     return 2.0 * sqrt(s) / (1.0 + sqrt(max(1.0 - 4.0 * bend * table_scale * s, 0.0)));
 }
 
+// Squared distance beyond which both curvatures have no light.
+float table_reach2(Material m) {
+    float reach = 0.0;
+    [[dont_unroll]] for (uint k = 0u; k < (CURVATURE != 0 && table_weight < 1.0 ? 2u : 1u); k++) {
+        uint reached = uint(profiles[table_base(m, table_node + k) + 1u]);
+        reach = max(reach, table_unbent(uintBitsToFloat((m.table_first + reached) << TABLE_SHIFT), table_bend[k]));
+    }
+    return reach * reach;
+}
+
+// The half-space's value, all channels together.
+float table_weighed(Material m, float r2) {
+    uint cell = clamp(floatBitsToUint(r2) >> TABLE_SHIFT, m.table_first, m.table_first + m.table_cells - 1u);
+    float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
+    uint i = table_base(m, m.table_nodes) + cell - m.table_first;
+    return mix(profiles[i], profiles[i + 1u], clamp((r2 - low) / (high - low), 0.0, 1.0));
+}
+
 // Radius with that density.
 float table_radius(Material m, float u_component, float u) {
     uint c = u_component < m.component_cdf[2] ? 0u : u_component < m.component_cdf[5] ? 1u : 2u;

@@ -21,32 +21,35 @@ PROBES(readonly);
 void main() {
     uint index = active_pixel();
     if (index >= step_.pixel_count) return;
-    if (probes[index].stamp != sample_index() + 1u) return;
-
     View view = views[0];
+    uint share = probes[index].share;
+    if (share - first_share(view) >= view.groups) return;
+
     Surface surface = surfaces[surface_index(index)];
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
     if (has_model(m, MODEL_TABLE)) table_of(probes[index]);
     uint batch = sample_index() % BATCHES;
+    float reach2 = probes[index].reach2;
     vec3 sum = vec3(0.0);
-    uint group = probes[index].group;
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
     [[dont_unroll]] for (uint y = tile.first.y; y < tile.end.y; y++) {
         [[dont_unroll]] for (uint x = tile.first.x; x < tile.end.x; x++) {
             uint other = y * view.crop_width + x;
-            if (!shares(other, group)) continue;
+            if (probes[other].share != share) continue;
             vec3 light = probes[other].light;
             if (light == vec3(0.0)) continue;
-            vec3 delta = surfaces[surface_index(other)].position - surface.position + probes[other].delta;
-            sum += light * value_at(m, delta, other == index);
+            vec3 delta = probes[other].hit - surface.position;
+            float r2 = other == index ? probes[index].hit_r2 : dot(delta, delta);
+            if (other == index || r2 <= reach2) sum += light * shape(m, r2);
         }
     }
 
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     float cos_eye = dot(s.shading_normal, s.wo);
-    float share = roughness_share(surface.triangle, surface.barycentric);
-    vec3 radiance = crossing(m, cos_eye, share) * leaving_share(m, share) * obliqueness(m, cos_eye, true) * sum;
+    float exit_share = roughness_share(surface.triangle, surface.barycentric);
+    vec3 radiance = crossing(m, cos_eye, exit_share) * leaving_share(m, exit_share) * obliqueness(m, cos_eye, true) * m.strength
+        * sum;
     if (has_model(m, MODEL_TABLE)) radiance *= table_balance(m, surface);
     if (has_texture(TEXTURE_BASE_COLOR)) {
         radiance *= texture_value(TEXTURE_BASE_COLOR, surface.triangle, surface.barycentric).rgb;

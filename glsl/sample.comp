@@ -24,13 +24,14 @@ void main() {
     probe.t_min = 1.0;
     probe.t_max = 0.0;
     probe.radius = 0.0;
-    probe.stamp = 0u;
-    probe.group = 0u;
+    probe.share = 0u;
+    probe.reach2 = 0.0;
     probe.table_node = 0u;
     probe.table_weight = 1.0;
     probe.table_bend = vec2(0.0);
     probe.table_scale = 0.0;
-    probe.delta = vec3(0.0);
+    probe.hit = vec3(0.0);
+    probe.hit_r2 = 0.0;
     probe.light = vec3(0.0);
     probes[index] = probe;
     Surface surface = surfaces[surface_index(index)];
@@ -55,9 +56,10 @@ void main() {
         if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     }
     if (REUSE != 0u) {
-        probe.stamp = sample_index() + 1u;
-        probe.group = 2u * triangles[surface.triangle].set + (s.side < 0.0 ? 1u : 0u);
+        probe.share = first_share(view) + 2u * triangles[surface.triangle].set + (s.side < 0.0 ? 1u : 0u);
+        probe.reach2 = m.radius_max * m.radius_max;
         if (has_model(m, MODEL_TABLE)) {
+            probe.reach2 = min(probe.reach2, table_reach2(m));
             probe.table_node = table_node;
             probe.table_weight = table_weight;
             probe.table_bend = table_bend;

@@ -313,6 +313,8 @@ struct View {
     uint emitter_count;
     // 1 to add the environment where a camera ray hits nothing.
     uint show_environment;
+    // Tiles: twice the number of sets.
+    uint groups;
     // Leaves of the cloud's tree, a power of two.
     uint leaves;
     // Radius over distance below which a cluster's centre stands for its points.
@@ -613,18 +615,20 @@ struct Probe {
     float t_max;
     // Camera projection only: radius in the tangent plane.
     float radius;
-    // Tiles only: 1 + the sample to which the following belongs, also where it has no probe; 0 for none.
-    uint stamp;
-    // 2 x the set, and 1 where its inner side is seen: pixels that have the same share hits.
-    uint group;
+    // Tiles only: (1 + sample) x View::groups + 2 x the set, and 1 more where its inner side is seen. Pixels that have
+    // the same share hits, also without a probe; 0 for none.
+    uint share;
+    // Tiles only: squared distance beyond which the pixel's profile, or the ball of its probes, ends.
+    float reach2;
     // Tabulated profile at the surface that is seen: the first of two curvatures, its weight, how distances bend for
     // both, and 1/4a^2.
     uint table_node;
     float table_weight;
     vec2 table_bend;
     float table_scale;
-    // Written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
-    vec3 delta;
+    // Written by `accumulate`: the hit that is lit, its squared distance from xo, and its light over the tile's weights.
+    vec3 hit;
+    float hit_r2;
     vec3 light;
 };
 

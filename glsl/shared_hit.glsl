@@ -9,30 +9,28 @@ void table_of(Probe probe) {
     table_scale = probe.table_scale;
 }
 
-// A pixel's value of light that enters at a distance: 0 where none of its probes looks. Its own hits count as in reach.
-vec3 value_at(Material m, vec3 delta, bool own) {
-    float r2 = dot(delta, delta);
-    return own || r2 <= m.radius_max * m.radius_max ? m.strength * shape(m, r2) : vec3(0.0);
+// G: about the profile of light that enters at a squared distance, the same for all pixels that share the hit.
+float tile_weight(Material m, float r2) {
+    if (has_model(m, MODEL_TABLE)) return table_weighed(m, r2);
+    vec3 value = m.strength * shape(m, r2);
+    return value.x + value.y + value.z;
 }
 
-// Whether a pixel shares hits with those of a group in this sample.
-bool shares(uint index, uint group) {
-    return probes[index].stamp == sample_index() + 1u && probes[index].group == group;
-}
-
-// The sum over pixels of the tile, and channels, of the values of the hit at `delta` from the point that pixel `index` sees.
-float tile_value(Tile tile, uint width, Material m, uint index, vec3 delta) {
-    float sum = 0.0;
-    uint group = probes[index].group;
-    vec3 hit = surfaces[surface_index(index)].position;
+// Of the hit of pixel `index` its weight over that of all pixels of the tile that may find it.
+float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float hit_r2) {
+    float own = 0.0, sum = 0.0;
+    uint share = probes[index].share;
     [[dont_unroll]] for (uint y = tile.first.y; y < tile.end.y; y++) {
         [[dont_unroll]] for (uint x = tile.first.x; x < tile.end.x; x++) {
             uint other = y * width + x;
-            if (!shares(other, group)) continue;
-            if (has_model(m, MODEL_TABLE)) table_of(probes[other]);
-            vec3 value = value_at(m, hit - surfaces[surface_index(other)].position + delta, other == index);
-            sum += value.x + value.y + value.z;
+            if (probes[other].share != share) continue;
+            vec3 delta = hit - surfaces[surface_index(other)].position;
+            // Its own hits count as in reach.
+            float r2 = other == index ? hit_r2 : dot(delta, delta);
+            float weight = tile_weight(m, r2);
+            if (other == index) own = weight;
+            if (other == index || r2 <= probes[other].reach2) sum += weight;
         }
     }
-    return sum;
+    return own / sum;
 }

@@ -31,6 +31,11 @@ Tile tile_of(View view, Place place, uint batch) {
     return Tile(uvec2(max(corner, ivec2(0))), uvec2(clamp(corner + int(REUSE), ivec2(0), size)));
 }
 
+// The sample's first Probe::share.
+uint first_share(View view) {
+    return (sample_index() + 1u) * view.groups;
+}
+
 // A permutation of the places, by three rounds of a Feistel network.
 uint shuffled(uint at, uint key) {
     uint x = at % REUSE, y = at / REUSE;

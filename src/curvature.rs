@@ -22,13 +22,16 @@
 //! which cubes have about the walk's total (`translucent::model_errors`). On plates, spheres and cylinders l' = l.
 
 pub mod balance;
+mod inside;
+pub mod places;
 
-use crate::reference::walk::mesh::{Corners, Mesh};
-use crate::reference::walk::shape::{Met, Shape};
+use crate::reference::walk::mesh::Corners;
 use crate::shared::Triangle;
 use glam::{DVec3, Vec3};
+use inside::Inside;
+use places::{Place, Places};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// L for the diffuse mean free path 1 / sigma_tr and the reduced mean free path 1 / sigma_t'.
@@ -37,10 +40,8 @@ pub fn reach(diffuse: f64, reduced: f64) -> f64 {
 }
 
 /// Directions from a point: at most and at least, and how many rays a scene may cost between them.
-const DIRECTIONS: (usize, usize) = (64, 16);
-const RAYS: usize = 4_000_000;
-/// Triangles up to which each is looked at from three points within it; beyond, their neighbours are near.
-const FEW: usize = 1 << 10;
+const DIRECTIONS: (usize, usize) = (64, 32);
+const RAYS: usize = 1 << 20;
 /// Distance, over L, beyond which a surface is out of sight: e^(-20/2) = 5e-5.
 const SIGHT: f64 = 20.0;
 /// Vertices closer than an internal unit over this are one, and no sphere is smaller.
@@ -49,20 +50,25 @@ const GRID: f64 = (1 << 20) as f64;
 /// 1 / a [1/internal unit] at the three vertices of each triangle, in their order; a set's entry of `lengths` is its L (>
 /// 0; it may be infinite). A set without one has 0.
 ///
-/// Rays start from three points of each triangle, of one alone where there are many, at its own normal; a vertex has the
-/// mean of the triangles around it. A ray that finds no surface counts as unbounded, so open meshes are surfaces of matter
+/// Rays start from [places](Places) on triangles, at their own normals; a vertex has the mean of those around it. A ray
+/// that finds no surface counts as unbounded, so open meshes are surfaces of matter
 /// that goes on behind them.
 pub fn inverse_radii(triangles: &[Triangle], lengths: &[Option<f64>]) -> Vec<Vec3> {
     let mut sets: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
         sets.entry(triangle.set).or_default().push(index);
     }
-    let directions = (RAYS / triangles.len().max(1)).clamp(DIRECTIONS.1, DIRECTIONS.0);
+    let wanted = sets.iter().filter_map(|(set, members)| Some((members, lengths[*set as usize]?.min(1e6))));
+    let of_set = |(members, length): (&Vec<usize>, f64)| -> (_, Vec<Corners>, _) {
+        (members.clone(), members.iter().map(|&index| corners(&triangles[index])).collect(), length)
+    };
+    let bodies: Vec<_> = wanted.map(of_set).collect();
+    let places: Vec<Places> = bodies.iter().map(|(_, corners, _)| Places::new(corners)).collect();
+    let count: usize = places.iter().map(|places| places.all.len()).sum();
+    let directions = (RAYS / count.max(1)).clamp(DIRECTIONS.1, DIRECTIONS.0);
     let mut radii = vec![Vec3::ZERO; triangles.len()];
-    for (set, members) in sets {
-        let Some(length) = lengths[set as usize].map(|length| length.min(1e6)) else { continue };
-        let corners: Vec<Corners> = members.iter().map(|&index| corners(&triangles[index])).collect();
-        for (index, found) in members.iter().zip(of_mesh(&corners, length, directions)) {
+    for ((members, corners, length), places) in bodies.iter().zip(&places) {
+        for (index, found) in members.iter().zip(at_vertices(corners, places, *length, directions)) {
             radii[*index] = found;
         }
     }
@@ -76,56 +82,24 @@ pub fn corners(triangle: &Triangle) -> Corners {
 
 /// 1 / a at the three vertices of each triangle of one body.
 pub fn of_mesh(corners: &[Corners], length: f64, directions: usize) -> Vec<Vec3> {
-    let mesh = Mesh::new(corners);
-    let near = |index: usize| {
-        let [a, b, c] = corners[index];
-        let (_, normal, _) = mesh.facet(index);
-        let middle = (a + b + c) / 3.0;
-        let of = |point: DVec3| DVec3::splat(inverse_radius(&mesh, point, normal, length, directions));
-        if corners.len() > FEW {
-            return [of(middle); 3];
-        }
-        [a, b, c].map(|corner| of((middle + corner) / 2.0))
-    };
-    let found: Vec<[DVec3; 3]> = (0..corners.len()).into_par_iter().map(near).collect();
-    let vertices = Vertices::new(corners, &found);
-    corners.iter().map(|triangle| Vec3::from(triangle.map(|corner| vertices.mean(corner).x as f32))).collect()
+    at_vertices(corners, &Places::new(corners), length, directions)
 }
 
-/// Means at vertices, over the triangles around them by area.
-struct Vertices(HashMap<[i64; 3], (DVec3, f64)>);
-
-impl Vertices {
-    fn new(corners: &[Corners], found: &[[DVec3; 3]]) -> Vertices {
-        let mut vertices = Vertices(HashMap::new());
-        for (triangle, values) in corners.iter().zip(found) {
-            let [a, b, c] = *triangle;
-            let area = (b - a).cross(c - a).length() / 2.0;
-            for (corner, value) in triangle.iter().zip(values) {
-                let (sum, weight) = vertices.0.entry(Vertices::key(*corner)).or_default();
-                (*sum, *weight) = (*sum + area * *value, *weight + area);
-            }
-        }
-        vertices
-    }
-
-    fn key(place: DVec3) -> [i64; 3] {
-        (place * GRID).round().to_array().map(|x| x as i64)
-    }
-
-    fn mean(&self, corner: DVec3) -> DVec3 {
-        let (sum, weight) = self.0[&Vertices::key(corner)];
-        sum / weight
-    }
+fn at_vertices(corners: &[Corners], places: &Places, length: f64, directions: usize) -> Vec<Vec3> {
+    let inside = Inside::new(corners);
+    let of = |place: &Place| DVec3::splat(inverse_radius(&inside, place.point, place.normal, length, directions));
+    let found: Vec<DVec3> = places.all.par_iter().map(of).collect();
+    let vertices = places.at_vertices(&found).into_iter();
+    vertices.map(|values| Vec3::from(values.map(|value| value.x as f32))).collect()
 }
 
 /// 1 / a at a point inside or on the surface, whose normal points outward.
-fn inverse_radius(mesh: &Mesh, point: DVec3, normal: DVec3, length: f64, directions: usize) -> f64 {
+fn inverse_radius(inside: &Inside, point: DVec3, normal: DVec3, length: f64, directions: usize) -> f64 {
     let (u, v) = normal.any_orthonormal_pair();
     // 1 - e^(-l/2L), whose digits remain when L is long.
-    let missed = |direction: DVec3| match mesh.leave(point, direction, SIGHT * length) {
-        Met::Surface { distance, .. } => -(-distance / (2.0 * length)).exp_m1(),
-        _ => 1.0,
+    let missed = |direction: DVec3| match inside.distance(point, direction, SIGHT * length) {
+        Some(distance) => -(-distance / (2.0 * length)).exp_m1(),
+        None => 1.0,
     };
     // Pairs on opposite sides of the normal, along a spiral.
     let pairs = directions / 2;

@@ -200,6 +200,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     view.directions = settings.directions;
     view.light_count = lights.len() as u32;
     view.emitter_count = emitters.len() as u32;
+    view.groups = 2 * scene.sets.len() as u32;
     view.leaves = clusters.len() as u32 / 2;
     view.opening = settings.cloud.opening as f32;
     view.show_environment = u32::from(settings.show_environment);

@@ -24,12 +24,11 @@
 //! by up to 5 % where the ring at a small sphere's diameter, which holds the light that crosses it straight, ends on the
 //! body (tests/physics/balance.rs).
 
-use super::{FEW, Vertices};
+use super::places::{Place, Places};
 use crate::reference::profile::table::Local;
 use crate::reference::walk::mesh::Corners;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_3, TAU};
 
 /// Radius of a group over its distance below which its centre stands for it.
@@ -53,27 +52,13 @@ pub fn of_mesh<'a>(
         let balance = DVec3::select(found.cmpgt(DVec3::ZERO), total / found, DVec3::ONE);
         if open { balance.min(DVec3::ONE) } else { balance }
     };
-    if corners.len() > FEW {
-        // From its vertices, which are fewer.
-        let mut places: HashMap<_, (DVec3, f64)> = HashMap::new();
-        for (triangle, curvatures) in corners.iter().zip(curvatures) {
-            for (corner, curvature) in triangle.iter().zip(curvatures.to_array()) {
-                places.entry(Vertices::key(*corner)).or_insert((*corner, curvature.into()));
-            }
-        }
-        let found: HashMap<_, Vec3> =
-            places.into_par_iter().map(|(key, (corner, curvature))| (key, at(corner, curvature).as_vec3())).collect();
-        return corners.iter().map(|triangle| triangle.map(|corner| found[&Vertices::key(corner)])).collect();
-    }
-    let near = |index: usize| {
-        let [a, b, c] = corners[index];
-        let [of_a, of_b, of_c] = curvatures[index].as_dvec3().to_array();
-        let (middle, mean) = ((a + b + c) / 3.0, (of_a + of_b + of_c) / 3.0);
-        [(a, of_a), (b, of_b), (c, of_c)].map(|(corner, own)| at((middle + corner) / 2.0, (mean + own) / 2.0))
+    let near = |place: &Place| {
+        let curvature = curvatures[place.triangle].as_dvec3().dot(place.weights);
+        at(place.point, curvature)
     };
-    let found: Vec<[DVec3; 3]> = (0..corners.len()).into_par_iter().map(near).collect();
-    let vertices = Vertices::new(corners, &found);
-    corners.iter().map(|triangle| triangle.map(|corner| vertices.mean(corner).as_vec3())).collect()
+    let places = Places::new(corners);
+    let found: Vec<DVec3> = places.all.par_iter().map(near).collect();
+    places.at_vertices(&found).into_iter().map(|values| values.map(|value| value.as_vec3())).collect()
 }
 
 /// Groups of triangles, each before what it holds.

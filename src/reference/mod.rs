@@ -41,7 +41,7 @@ use crate::shared::{
     BATCHES, Balance, Coordinates, Emitter, Features, Hits, Light, Material, Mixture, Pixel, Probe, Shading, Step,
     Sums, Surface, Texture, Triangle, View,
 };
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -121,9 +121,9 @@ pub fn render(inputs: &Inputs, rows: Range<u32>, samples: Range<u32>) -> Vec<Pix
         if inputs.features.reuse != 0 {
             let stage = reuse::Stage { surfaces, probes: &probes };
             let light = |index| reuse::light(inputs, &step, index, &stage, &hits[index as usize]).unwrap_or_default();
-            let lit: Vec<(DVec3, DVec3)> = of_each().map(light).collect();
-            for (probe, (delta, light)) in probes.iter_mut().zip(lit) {
-                (probe.delta, probe.light) = (delta.as_vec3(), light.as_vec3());
+            let lit: Vec<reuse::Lit> = of_each().map(light).collect();
+            for (probe, lit) in probes.iter_mut().zip(lit) {
+                lit.into_probe(probe);
             }
         }
         let stage = reuse::Stage { surfaces, probes: &probes };

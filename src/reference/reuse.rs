@@ -7,26 +7,29 @@
 //! p_i the density of the hits of i's probes, and E the light that enters, pixel i of a tile T gets from the hits x of all
 //! probes j in T
 //!
-//!   Lo_i ~ Ft(wo) sum over j, x of  m_j(x) f_i(x) / p_j(x) E(x),     m_j(x) = F_j(x) / sum over k in T of F_k(x).
+//!   Lo_i ~ Ft(wo) sum over j, x of  m_j(x) f_i(x) / p_j(x) E(x),     m_j(x) = G_j(x) / sum over k in T of G_k(x).
 //!
-//! The weights m_j add up to 1 at each x where any F_k > 0, and p_j > 0 wherever F_j > 0, so the expectation is that of
-//! each pixel alone, whatever the tile. That takes F_j = 0 beyond the ball in which j's probes look, and pixels of one set
-//! that are seen from one side: then the hits of one are hits of the other. One hit of each probe is lit, with the
+//! The weights m_j add up to 1 at each x where any G_k > 0, so the expectation is that of each pixel alone, whatever the
+//! tile, if p_j > 0 wherever G_j > 0. That takes G_j = 0 beyond j's [reach](super::shared_hit::reach), where its profile
+//! ends or its probes do not look, and pixels of one set that are seen from one side: then the hits of one are hits of the
+//! other. Within its reach G_j is [about F_j](super::shared_hit::weight). One hit of each probe is lit, with the
 //! probability c / C, c = F_j / p_j, C the sum of c over the probe's hits, so that what is added is
 //!
-//!   C E(x) f_i(x) / sum over k of F_k(x):
+//!   C E(x) f_i(x) / F_j(x) G_j(x) / sum over k of G_k(x):
 //!
-//! each channel is at most C E, which bounds the weight of a hit of a pixel alone too. Where a tile is small beside the
-//! mean free path, all F_k are alike and the variance is that of W^2 probes; where it is large, that of one. The noise of
-//! neighbours goes together: the mean over an area is no better than it was.
+//! with G = F each channel would be at most C E, which bounds the weight of a hit of a pixel alone too; it is more by as
+//! much as F / G differs between the tile's pixels. Where a tile is small beside the mean free path, all F_k are alike and
+//! the variance is that of W^2 probes; where it is large, that of one. The noise of neighbours goes together: the mean
+//! over an area is no better than it was.
 
 use super::Inputs;
 use super::accumulate::{Entry, choose, entering_light, leaving};
 use super::profile::obliqueness;
+use super::profile::shapes;
 use super::projection::{matter_at, seen};
-use super::shared_hit::{sharing, tile_value, value};
+use super::shared_hit::{reach, sharing, tile_share};
 use super::sums::Contribution;
-use super::tile::Place;
+use super::tile::{Place, first_share};
 use crate::shared::{Hits, MODEL_LAMBERT, Probe, Step, Surface};
 use glam::DVec3;
 
@@ -44,11 +47,35 @@ impl Stage<'_> {
     }
 }
 
-/// The part of `accumulate.comp`: from the point that pixel `index` sees to the hit that it lights, and that hit's light
-/// over the values of the tile; none where there is no such hit.
-pub fn light(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &Hits) -> Option<(DVec3, DVec3)> {
+/// A hit that a pixel lights.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lit {
+    pub position: DVec3,
+    /// From the point that the pixel sees.
+    pub distance: f64,
+    /// Times its share of the tile's weights over its own profile.
+    pub light: DVec3,
+}
+
+impl Lit {
+    /// As `accumulate.comp` leaves it.
+    pub fn into_probe(self, probe: &mut Probe) {
+        probe.hit = self.position.as_vec3();
+        probe.hit_r2 = (self.distance * self.distance) as f32;
+        probe.light = self.light.as_vec3();
+    }
+}
+
+/// Whether pixel `index` shares hits in the step's sample.
+fn takes_part(inputs: &Inputs, step: &Step, stage: &Stage, index: u32) -> bool {
+    let share = stage.probes[index as usize].share;
+    share.wrapping_sub(first_share(inputs, step)) < inputs.view.groups
+}
+
+/// The part of `accumulate.comp`: the hit that pixel `index` lights; none where there is no such hit.
+pub fn light(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &Hits) -> Option<Lit> {
     let (surface, probe) = (&stage.surfaces[index as usize], &stage.probes[index as usize]);
-    if probe.stamp != step.sample_index + 1 || step.ray_count == 0 {
+    if !takes_part(inputs, step, stage, index) || step.ray_count == 0 {
         return None;
     }
     let (matter, seen) = (matter_at(inputs, surface), seen(inputs, surface));
@@ -61,22 +88,29 @@ pub fn light(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &Hit
     if light == DVec3::ZERO {
         return None;
     }
-    Some((delta, light * weighted.element_sum() / tile_value(inputs, step, stage, index, delta)))
+    let profile = matter.material.strength.as_dvec3() * shapes(matter, delta.length());
+    let share = tile_share(inputs, step, stage, index, delta);
+    let light = light * (weighted.element_sum() / profile.element_sum() * share);
+    Some(Lit { position: seen.position + delta, distance: delta.length(), light })
 }
 
 /// The contribution of the tile's hits to pixel `index`, with what [`light`] found in the probes.
 pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage) -> Contribution {
     let surface = &stage.surfaces[index as usize];
-    if stage.probes[index as usize].stamp != step.sample_index + 1 {
+    if !takes_part(inputs, step, stage, index) {
         return Contribution::default();
     }
     let matter = matter_at(inputs, surface);
     debug_assert!(matter.material.model != MODEL_LAMBERT, "no probe is drawn in the opaque limit");
     let of = |other: u32| {
-        let Probe { delta, light, .. } = stage.probes[other as usize];
-        let delta = stage.position(other) - stage.position(index) + delta.as_dvec3();
-        light.as_dvec3() * value(matter, delta, other == index)
+        let Probe { hit, hit_r2, light, .. } = stage.probes[other as usize];
+        let own = other == index;
+        let r = if own { f64::from(hit_r2).sqrt() } else { hit.as_dvec3().distance(stage.position(index)) };
+        let reached = own || r <= reach(matter);
+        if reached { light.as_dvec3() * shapes(matter, r) } else { DVec3::ZERO }
     };
     let sum: DVec3 = sharing(inputs, step, stage, index).into_iter().map(of).sum();
-    Contribution::of(leaving(inputs, matter, matter, &seen(inputs, surface), surface) * sum)
+    Contribution::of(
+        leaving(inputs, matter, matter, &seen(inputs, surface), surface) * matter.material.strength.as_dvec3() * sum,
+    )
 }

@@ -7,7 +7,8 @@
 
 use super::profile::{self, Matter, draw_radius};
 use super::projection::{CAMERA, fractions, matter_at, seen};
-use super::tile::{Place, coordinate};
+use super::shared_hit::reach;
+use super::tile::{Place, coordinate, first_share};
 use super::{Inputs, mixture};
 use crate::shared::{
     DIM_ANGLE, DIM_COMPONENT, DIM_RADIUS, DIM_TECHNIQUE, MISS, MODEL_TABLE, PROJECTION_CAMERA, Probe, Step, Surface,
@@ -25,13 +26,14 @@ pub const NONE: Probe = Probe {
     t_min: 1.0,
     t_max: 0.0,
     radius: 0.0,
-    stamp: 0,
-    group: 0,
+    share: 0,
+    reach2: 0.0,
     table_node: 0,
     table_weight: 1.0,
     table_bend: glam::Vec2::ZERO,
     table_scale: 0.0,
-    delta: glam::Vec3::ZERO,
+    hit: glam::Vec3::ZERO,
+    hit_r2: 0.0,
     light: glam::Vec3::ZERO,
 };
 
@@ -72,8 +74,9 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
 
     let mut none = NONE;
     if inputs.features.reuse != 0 {
-        none.stamp = step.sample_index + 1;
-        none.group = 2 * inputs.triangles[surface.triangle as usize].set + u32::from(seen.side < 0.0);
+        let inside = u32::from(seen.side < 0.0);
+        none.share = first_share(inputs, step) + 2 * inputs.triangles[surface.triangle as usize].set + inside;
+        none.reach2 = reach(matter).powi(2) as f32;
         if matter.material.model == MODEL_TABLE {
             let placement = profile::table::placement(matter);
             (none.table_node, none.table_weight) = (placement.node, placement.weight as f32);

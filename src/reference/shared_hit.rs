@@ -1,36 +1,42 @@
 //! What a lit hit brings to the pixels of its tile: twin of `shared_hit.glsl`. See [`reuse`](mod@super::reuse).
 
-use super::profile::{Matter, shapes};
+use super::profile::{Matter, shapes, table};
 use super::projection::matter_at;
 use super::tile::{Place, members};
 use super::{Inputs, reuse::Stage};
-use crate::shared::Step;
+use crate::shared::{MODEL_TABLE, Step};
 use glam::DVec3;
 
-/// F: a pixel's value of light that enters at `delta` from the point that it sees; 0 where none of its probes looks. Its
-/// `own` hits count as in reach.
-pub fn value(matter: Matter, delta: DVec3, own: bool) -> DVec3 {
-    let r = delta.length();
-    let reached = own || r <= f64::from(matter.material.radius_max);
-    if reached { matter.material.strength.as_dvec3() * shapes(matter, r) } else { DVec3::ZERO }
+/// Distance beyond which a pixel's profile ends, or the ball in which its probes look.
+pub fn reach(matter: Matter) -> f64 {
+    let radius = f64::from(matter.material.radius_max);
+    if matter.material.model == MODEL_TABLE { table::reach(matter).min(radius) } else { radius }
+}
+
+/// G: about the profile at a distance, the same for all pixels that share the hit; of a tabulated one that of the half-space,
+/// all channels together, which takes few reads.
+pub fn weight(matter: Matter, r: f64) -> f64 {
+    match matter.material.model {
+        MODEL_TABLE => table::weighed(matter, r * r),
+        _ => (matter.material.strength.as_dvec3() * shapes(matter, r)).element_sum(),
+    }
 }
 
 /// The pixels of the tile that share hits with pixel `index`, itself among them.
 pub fn sharing(inputs: &Inputs, step: &Step, stage: &Stage, index: u32) -> Vec<u32> {
-    let own = &stage.probes[index as usize];
-    let shares = |other: &u32| {
-        let other = &stage.probes[*other as usize];
-        (other.stamp, other.group) == (step.sample_index + 1, own.group)
-    };
+    let own = stage.probes[index as usize].share;
+    let shares = |other: &u32| stage.probes[*other as usize].share == own;
     members(inputs, step, Place::of(inputs, step, index)).into_iter().filter(shares).collect()
 }
 
-/// The sum over those pixels, and channels, of the values of the hit at `delta` from the point that pixel `index` sees.
-pub fn tile_value(inputs: &Inputs, step: &Step, stage: &Stage, index: u32, delta: DVec3) -> f64 {
-    let value = |other: u32| {
-        let surface = &stage.surfaces[other as usize];
-        let delta = stage.position(index) - stage.position(other) + delta;
-        value(matter_at(inputs, surface), delta, other == index).element_sum()
+/// G of the hit at `delta` from the point that pixel `index` sees, over the sum of those of all pixels of the tile that may
+/// find it. Its own hits count as in reach.
+pub fn tile_share(inputs: &Inputs, step: &Step, stage: &Stage, index: u32, delta: DVec3) -> f64 {
+    let of = |other: u32| {
+        let matter = matter_at(inputs, &stage.surfaces[other as usize]);
+        let r = (stage.position(index) - stage.position(other) + delta).length();
+        let reached = other == index || r <= reach(matter);
+        if reached { weight(matter, r) } else { 0.0 }
     };
-    sharing(inputs, step, stage, index).into_iter().map(value).sum()
+    of(index) / sharing(inputs, step, stage, index).into_iter().map(of).sum::<f64>()
 }

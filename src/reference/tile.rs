@@ -47,6 +47,11 @@ impl Place {
     }
 }
 
+/// The first [`Probe::share`](crate::shared::Probe::share) of the step's sample.
+pub fn first_share(inputs: &Inputs, step: &Step) -> u32 {
+    (step.sample_index + 1).wrapping_mul(inputs.view.groups)
+}
+
 /// By how much the tiles of the sample's batch are moved to the left and up.
 fn offset(width: u32, sample_index: u32) -> (u32, u32) {
     let batch = batch(sample_index);

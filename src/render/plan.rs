@@ -219,8 +219,8 @@ fn room(prepared: &Prepared, slot: Slot) -> u64 {
         _ if prepared.features.recorded == 0 => 0,
         Slot::Profiles => {
             let tables = choices().filter(|choice| choice.model == Model::Table).count();
-            let nodes = if prepared.features.curvature == 0 { 1 } else { TABLE_NODES as usize };
-            tables * nodes * Block::stride(MOST_CELLS)
+            let nodes = if prepared.features.curvature == 0 { 1 } else { TABLE_NODES };
+            tables * Block::size(nodes, MOST_CELLS)
         }
         Slot::Boundaries => choices().count() * (prepared.features.rough * BOUNDARY_ROW) as usize,
         _ => 0,

@@ -30,7 +30,7 @@ const PADDING: f32 = 1.0 / (1 << 20) as f32;
 ///
 /// No triangle is split, so each is in exactly one leaf.
 pub(super) fn build(file: &Path, triangles: &[shared::Triangle]) -> Result<(Vec<UVec4>, Vec<u32>)> {
-    let boxes: Vec<Aabb> = triangles.iter().map(bounds).collect();
+    let boxes: Vec<Aabb> = triangles.iter().map(|triangle| bounds(triangle.vertices.map(Vec3A::from))).collect();
     let wide = bvh2_to_cwbvh(&binary(&boxes), LEAF_TRIANGLES, true, false);
     let depth = depth(&wide);
     if depth > BVH_DEPTH as usize {
@@ -41,8 +41,7 @@ pub(super) fn build(file: &Path, triangles: &[shared::Triangle]) -> Result<(Vec<
 }
 
 /// The box of a triangle, padded.
-fn bounds(triangle: &shared::Triangle) -> Aabb {
-    let [a, b, c] = triangle.vertices.map(Vec3A::from);
+pub(crate) fn bounds([a, b, c]: [Vec3A; 3]) -> Aabb {
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
     let padding = Vec3A::splat(PADDING * low.abs().max(high.abs()).max_element().max(1.0));
     Aabb::new(low - padding, high + padding)
@@ -50,7 +49,7 @@ fn bounds(triangle: &shared::Triangle) -> Aabb {
 
 /// A binary tree with one box a leaf: split by the surface area heuristic over bins, and in halves below
 /// COSTED_LEVELS and where all centres coincide.
-fn binary(boxes: &[Aabb]) -> Bvh2 {
+pub(crate) fn binary(boxes: &[Aabb]) -> Bvh2 {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = Vec::with_capacity(2 * boxes.len());
     nodes.push(Bvh2Node::default());

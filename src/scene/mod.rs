@@ -1,7 +1,7 @@
 //! A checked scene: plain data in f64 metres, and geometry in f32 internal units. No Vulkan.
 
 mod accessor;
-mod bvh;
+pub(crate) mod bvh;
 mod camera;
 mod check;
 mod environment;

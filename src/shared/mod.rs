@@ -308,6 +308,8 @@ structs! {
         emitter_count: u32,
         /// 1 to add the environment where a camera ray hits nothing.
         show_environment: u32,
+        /// Tiles: twice the number of sets.
+        groups: u32,
         /// Leaves of the cloud's tree, a power of two.
         leaves: u32,
         /// Radius over distance below which a cluster's centre stands for its points.
@@ -608,18 +610,20 @@ structs! {
         t_max: f32,
         /// Camera projection only: radius in the tangent plane.
         radius: f32,
-        /// Tiles only: 1 + the sample to which the following belongs, also where it has no probe; 0 for none.
-        stamp: u32,
-        /// 2 x the set, and 1 where its inner side is seen: pixels that have the same share hits.
-        group: u32,
+        /// Tiles only: (1 + sample) x View::groups + 2 x the set, and 1 more where its inner side is seen. Pixels that have
+        /// the same share hits, also without a probe; 0 for none.
+        share: u32,
+        /// Tiles only: squared distance beyond which the pixel's profile, or the ball of its probes, ends.
+        reach2: f32,
         /// Tabulated profile at the surface that is seen: the first of two curvatures, its weight, how distances bend for
         /// both, and 1/4a^2.
         table_node: u32,
         table_weight: f32,
         table_bend: Vec2,
         table_scale: f32,
-        /// Written by `accumulate`: from xo to the hit that is lit, and its light over the tile's values.
-        delta: Vec3,
+        /// Written by `accumulate`: the hit that is lit, its squared distance from xo, and its light over the tile's weights.
+        hit: Vec3,
+        hit_r2: f32,
         light: Vec3,
     }
 

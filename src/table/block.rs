@@ -9,7 +9,8 @@
 //! # Layout
 //! Node by node of the curvature: 1/a, the number of cells that the sphere reaches, 1 / mass of each channel, slope of the
 //! total in 1 - mu' of each channel; then for each channel the values at the nodes of the grid and the light within them.
-//! A profile is divided by the total of the half-space, which is in the material's strength.
+//! A profile is divided by the total of the half-space, which is in the material's strength. After the last curvature, the
+//! half-space's values at the nodes, not divided, summed over channels: what tiles weigh hits by.
 
 use super::grid;
 use super::white::{Profile, White};
@@ -85,12 +86,19 @@ impl Block {
             block.push(1.0 / radius, reached, &columns);
         }
         block.push(0.0, cells, &plane);
+        let sum = |i: usize| plane.iter().flatten().map(|column| column.values[i]).sum::<f64>() as f32;
+        block.data.extend((0..=cells as usize).map(sum));
         block
     }
 
     /// Numbers of one curvature.
     pub fn stride(cells: u32) -> usize {
         HEADER + 6 * (cells as usize + 1)
+    }
+
+    /// Numbers of a block.
+    pub fn size(nodes: u32, cells: u32) -> usize {
+        nodes as usize * Block::stride(cells) + cells as usize + 1
     }
 
     fn push(&mut self, curvature: f64, reached: u32, columns: &[Option<Column>; 3]) {

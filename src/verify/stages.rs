@@ -13,7 +13,7 @@ use crate::{
         reflect::reflect as twin_reflect,
         reproject::reproject as twin_reproject,
         resolve::resolve as twin_resolve,
-        reuse::{Stage, light, reuse as twin_reuse},
+        reuse::{Lit, Stage, light, reuse as twin_reuse},
         sample::sample as twin_sample,
         single::single as twin_single,
         strict,
@@ -43,7 +43,7 @@ pub struct Staged {
     pub probes: Vec<Probe>,
     pub hits: Vec<Hits>,
     /// What `accumulate` leaves for the pixels of a tile.
-    pub lit: Vec<Option<(DVec3, DVec3)>>,
+    pub lit: Vec<Option<Lit>>,
 }
 
 impl Staged {
@@ -104,9 +104,10 @@ impl Staged {
 
     /// The probes as `accumulate` leaves them.
     fn lit_probes(&self) -> Vec<Probe> {
-        let with = |(probe, lit): (&Probe, &Option<(DVec3, DVec3)>)| {
-            let (delta, light) = lit.unwrap_or_default();
-            Probe { delta: delta.as_vec3(), light: light.as_vec3(), ..*probe }
+        let with = |(probe, lit): (&Probe, &Option<Lit>)| {
+            let mut probe = *probe;
+            lit.unwrap_or_default().into_probe(&mut probe);
+            probe
         };
         self.probes.iter().zip(&self.lit).map(with).collect()
     }
@@ -227,7 +228,7 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         let name = &staged.case.name;
         let surfaces = staged.g_buffers();
         // What an earlier sample may have left.
-        let stale = Probe { t_max: 2.0, stamp: 7, light: Vec3::ONE, ..Probe::default() };
+        let stale = Probe { t_max: 2.0, share: 7, light: Vec3::ONE, ..Probe::default() };
         let probes = vec![stale; staged.probes.len()];
         let buffers: [(Slot, &[u8]); 2] =
             [(Slot::Surfaces, bytemuck::cast_slice(&surfaces)), (Slot::Probes, bytemuck::cast_slice(&probes))];
@@ -236,9 +237,9 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         for (i, (found, twin)) in found.iter().zip(&staged.probes).enumerate() {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
             let exists = |p: &Probe| p.t_min <= p.t_max;
-            verdict.words(found.stamp, twin.stamp, || at("stamp"));
+            verdict.words(found.share, twin.share, || at("share"));
+            verdict.compare(found.reach2, twin.reach2.into(), twin.reach2.into(), || at("reach"));
             verdict.require(found.light == Vec3::ZERO, || at("light"));
-            verdict.words(found.group, twin.group, || at("group"));
             verdict.words(found.table_node, twin.table_node, || at("node"));
             verdict.compare(found.table_weight, twin.table_weight.into(), 1.0, || at("weight"));
             let bend = twin.table_bend.as_dvec2().extend(twin.table_scale.into());
@@ -349,9 +350,10 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         for (i, (found, twin)) in probes.iter().zip(&staged.lit).enumerate() {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
             verdict.words(u32::from(found.light != Vec3::ZERO), twin.is_some().into(), || at("lit"));
-            if let Some((delta, light)) = twin {
+            if let Some(Lit { position, distance, light }) = twin {
                 lit += 1;
-                verdict.vector(found.delta, *delta, delta.length().max(1.0), || at("place"));
+                verdict.vector(found.hit, *position, position.length().max(1.0), || at("place"));
+                verdict.compare(found.hit_r2, distance.powi(2), distance.powi(2), || at("distance"));
                 verdict.vector(found.light, *light, light.length(), || at("light"));
             }
         }

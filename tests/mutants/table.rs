@@ -102,11 +102,13 @@ mutants! {
     "tile.glsl", "off by one", "kernel.accumulate": "clamp(corner + int(REUSE), ivec2(0), size)" =>
         "clamp(corner + int(REUSE) - 1, ivec2(0), size)";
     "sample.comp", "lost factor", "kernel.sample": "2u * triangles[surface.triangle].set" => "triangles[surface.triangle].set";
-    "shared_hit.glsl", "lost condition", "kernel.accumulate": " && probes[index].group == group" => "";
-    "shared_hit.glsl", "sign", "kernel.accumulate": "hit - surfaces[surface_index(other)].position + delta" =>
-        "hit - surfaces[surface_index(other)].position - delta";
+    "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (probes[other].share != share) continue;" => "";
+    "shared_hit.glsl", "sign", "kernel.accumulate": "hit - surfaces[surface_index(other)].position" =>
+        "hit + surfaces[surface_index(other)].position";
+    "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (other == index || r2 <= probes[other].reach2) sum" => "sum";
     "sample.comp", "lost term", "kernel.sample": "probe.light = vec3(0.0);" => "";
-    "reuse.comp", "index", "kernel.reuse": "surface.position + probes[other].delta" => "surface.position + probes[index].delta";
+    "reuse.comp", "index", "kernel.reuse": "probes[other].hit - surface.position" => "probes[index].hit - surface.position";
+    "profile_table.glsl", "off by one", "kernel.accumulate": "table_base(m, m.table_nodes) + cell" => "table_base(m, m.table_nodes) + 1u + cell";
     "sample.comp", "sign", "kernel.sample": "probe.t_max = -b + half_chord;" => "probe.t_max = b + half_chord;";
     "sample.comp", "swapped branch", "kernel.sample":
         "technique == TECHNIQUE_U ? tangent : bitangent" => "technique == TECHNIQUE_U ? bitangent : tangent";

@@ -62,3 +62,29 @@ fn bodies_that_touch_have_finite_curvatures() {
     assert!(found.iter().all(|inverse| inverse.is_finite() && inverse.min_element() > 0.0), "{most}");
     assert!(most <= (1 << 20) as f32, "{most}");
 }
+
+/// Of a fine mesh fewer places are looked at than it has triangles.
+#[test]
+fn a_fine_mesh_has_the_curvatures_of_a_coarse_one() {
+    let size = dvec3(1.0, 0.8, 0.3);
+    let of = |cells| {
+        let mesh = Mesh::cuboid(size, cells);
+        let corners: Vec<Corners> = (0..mesh.len()).map(|index| mesh.corners(index)).collect();
+        let found = of_mesh(&corners, 0.2, 64);
+        let all: Vec<(DVec3, f32)> =
+            corners.iter().zip(found).flat_map(|(t, inverse)| t.iter().copied().zip(inverse.to_array())).collect();
+        (corners.len(), all)
+    };
+    let ((few, coarse), (many, fine)) = (of(12), of(72));
+    assert!(few < 1 << 14 && many > 1 << 14);
+    // Beside an edge both are means over what lies near, which changes fast there.
+    let inner = |corner: DVec3| (size / 2.0 - corner.abs()).to_array().iter().filter(|&&way| way > 0.1).count() == 2;
+    let mut seen = 0;
+    for (corner, inverse) in coarse.into_iter().filter(|&(corner, _)| inner(corner)) {
+        let (_, same) = fine.iter().find(|(other, _)| other.distance(corner) < 1e-9).expect("a vertex of both");
+        let off = f64::from(same / inverse) - 1.0;
+        assert!(off.abs() < 0.03, "{corner}: {inverse} and {same}");
+        seen += 1;
+    }
+    assert!(seen > 100, "{seen} vertices");
+}

@@ -229,6 +229,22 @@ pub fn placement(matter: Matter) -> Placement {
     }
 }
 
+/// Distance beyond which there is no light.
+pub(in crate::reference) fn reach(matter: Matter) -> f64 {
+    Local::new(matter).end()
+}
+
+/// The half-space's value at the squared distance, all channels together, of matter that reflects all light: constant
+/// below the first node.
+pub(in crate::reference) fn weighed(matter: Matter, s: f64) -> f64 {
+    let Material { table, table_first, table_cells, table_nodes, .. } = *matter.material;
+    let values = &matter.tables[table as usize + table_nodes as usize * Block::stride(table_cells)..];
+    let i = grid::cell(s as f32).clamp(table_first, table_first + table_cells - 1) - table_first;
+    let [low, high] = [i, i + 1].map(|i| (f64::from(grid::node(table_first + i)), f64::from(values[i as usize])));
+    let t = ((s - low.0) / (high.0 - low.0)).clamp(0.0, 1.0);
+    low.1 * (1.0 - t) + high.1 * t
+}
+
 /// shape(r) of the three channels.
 pub(super) fn shapes(matter: Matter, r: f64) -> DVec3 {
     parts(matter).iter().map(|part| part.values(matter, r)).sum()
