@@ -55,21 +55,16 @@ vec3 table_value(Material m, uint node, float r2) {
     uint base = table_base(m, node);
     uint cell = floatBitsToUint(r2) >> TABLE_SHIFT;
     uint nodes = m.table_cells + 1u;
-    uint values = base + TABLE_HEADER;
-    if (cell < m.table_first) {
-        uint within = values + nodes;
-        vec3 inner = vec3(profiles[within], profiles[within + 2u * nodes], profiles[within + 4u * nodes]);
-        return inner / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT));
-    }
-    uint i = cell - m.table_first;
-    if (i >= uint(profiles[base + 1u])) return vec3(0.0);
+    bool before = cell < m.table_first;
+    if (!before && cell - m.table_first >= uint(profiles[base + 1u])) return vec3(0.0);
     float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
     float t = (r2 - low) / (high - low);
-    i += values;
+    // Before the first cell the light within it counts; a branch of its own would read on every device's lanes.
+    uint i = base + TABLE_HEADER + (before ? nodes : cell - m.table_first);
     vec3 a = vec3(profiles[i], profiles[i + 2u * nodes], profiles[i + 4u * nodes]);
-    i += 1u;
+    i += before ? 0u : 1u;
     vec3 b = vec3(profiles[i], profiles[i + 2u * nodes], profiles[i + 4u * nodes]);
-    return mix(a, b, t);
+    return before ? a / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT)) : mix(a, b, t);
 }
 
 vec3 table_vector(Material m, uint node, uint at) {
@@ -111,6 +106,35 @@ float table_density(Material m, float r2) {
 float table_unbent(float s, float bend) {
     if (CURVATURE == 0 || bend == 0.0) return sqrt(s);
     return 2.0 * sqrt(s) / (1.0 + sqrt(max(1.0 - 4.0 * bend * table_scale * s, 0.0)));
+}
+
+// The one of the two curvatures that `table_drawn` reads: its first value, the cells that it reaches, how distances bend.
+uint table_values = 0u;
+uint table_reached = 0u;
+float table_drawn_bend = 0.0;
+
+// Draws it by their weights.
+void table_draw(Material m, float u) {
+    uint second = CURVATURE != 0 && u >= table_weight ? 1u : 0u;
+    uint base = table_base(m, table_node + second);
+    table_values = base + TABLE_HEADER;
+    table_reached = uint(profiles[base + 1u]);
+    table_drawn_bend = table_bend[second];
+}
+
+// One of the node's two values around the squared distance, drawn by their weights.
+vec3 table_drawn(Material m, float r2, float u) {
+    float area;
+    float bent = table_bent(r2, table_drawn_bend, area);
+    uint cell = floatBitsToUint(bent) >> TABLE_SHIFT;
+    float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
+    bool before = cell < m.table_first;
+    uint i = before ? 0u : cell - m.table_first;
+    if (!before && i >= table_reached) return vec3(0.0);
+    uint nodes = m.table_cells + 1u;
+    uint at = table_values + (before ? nodes : i + (u * (high - low) < bent - low ? 1u : 0u));
+    vec3 value = area * vec3(profiles[at], profiles[at + 2u * nodes], profiles[at + 4u * nodes]);
+    return before ? value / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT)) : value;
 }
 
 // Squared distance beyond which both curvatures have no light.

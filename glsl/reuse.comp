@@ -28,20 +28,27 @@ void main() {
     Surface surface = surfaces[surface_index(index)];
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
-    if (has_model(m, MODEL_TABLE)) table_of(probes[index]);
     uint batch = sample_index() % BATCHES;
+    uint key = dimension_key(pixel_key(view.seed, pixel_position(view, index)), batch, DIM_REUSE)
+        + hash(sample_index() / BATCHES);
+    if (has_model(m, MODEL_TABLE)) {
+        table_of(probes[index]);
+        table_draw(m, unit(hash(key)));
+    }
+    uint turn = hash(key + 1u);
     float reach2 = probes[index].reach2;
     vec3 sum = vec3(0.0);
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
     [[dont_unroll]] for (uint y = tile.first.y; y < tile.end.y; y++) {
         [[dont_unroll]] for (uint x = tile.first.x; x < tile.end.x; x++) {
             uint other = y * view.crop_width + x;
+            turn += GOLDEN;
             if (probes[other].share != share) continue;
             vec3 light = probes[other].light;
             if (light == vec3(0.0)) continue;
             vec3 delta = probes[other].hit - surface.position;
             float r2 = other == index ? probes[index].hit_r2 : dot(delta, delta);
-            if (other == index || r2 <= reach2) sum += light * shape(m, r2);
+            if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));
         }
     }
 

@@ -163,6 +163,10 @@ const uint DIM_SINGLE = 16u;
 const uint DIM_SINGLE_LIGHT = 18u;
 // Dimensions 20 and 21: point of an emitter for that point (a point per direction).
 const uint DIM_SINGLE_EMITTER = 20u;
+// Dimension of the hash that draws where tabulated profiles of a tile's hits are read.
+const uint DIM_REUSE = 22u;
+// 2^32 over the golden ratio: the step of numbers that cover [0, 1) evenly.
+const uint GOLDEN = 2654435769u;
 // Added to a dimension for what the place in a tile brings to it.
 const uint DIM_PLACE = 32u;
 // Of `functions`: x y + z, x / y and sqrt |x|, for what the device's arithmetic is.

@@ -21,16 +21,24 @@
 //! much as F / G differs between the tile's pixels. Where a tile is small beside the mean free path, all F_k are alike and
 //! the variance is that of W^2 probes; where it is large, that of one. The noise of neighbours goes together: the mean
 //! over an area is no better than it was.
+//!
+//! # Reading tables
+//! A tabulated f_i is a mean of values: of two curvatures by their weights, of two nodes of the distance by theirs. One of
+//! each is drawn (as textures may be: M. Fajardo, B. Wronski, M. Salvi, M. Pharr, "Stochastic texture filtering" (2023)):
+//! the curvature once for a pixel and sample, the node for each hit by numbers u_n = u_0 + n / golden ratio, which cover
+//! [0, 1) evenly. The expectation is the same, with a quarter of the reads.
 
 use super::Inputs;
 use super::accumulate::{Entry, choose, entering_light, leaving};
+use super::pixel::position;
 use super::profile::obliqueness;
-use super::profile::shapes;
+use super::profile::{shapes, shapes_drawn};
 use super::projection::{matter_at, seen};
+use super::random::{batch, hash, key, unit};
 use super::shared_hit::{reach, sharing, tile_share};
 use super::sums::Contribution;
-use super::tile::{Place, first_share};
-use crate::shared::{Hits, MODEL_LAMBERT, Probe, Step, Surface};
+use super::tile::{Place, first_share, members};
+use crate::shared::{BATCHES, DIM_REUSE, GOLDEN, Hits, MODEL_LAMBERT, Probe, Step, Surface};
 use glam::DVec3;
 
 /// What the pixels of a band see and probe in a sample.
@@ -102,14 +110,24 @@ pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage) -> Contrib
     }
     let matter = matter_at(inputs, surface);
     debug_assert!(matter.material.model != MODEL_LAMBERT, "no probe is drawn in the opaque limit");
-    let of = |other: u32| {
+    let (px, py) = position(inputs.view, step, index);
+    let key = key(inputs.view.seed, px, py, batch(step.sample_index), DIM_REUSE);
+    let key = key.wrapping_add(hash(step.sample_index / BATCHES));
+    let (node, first) = (unit(hash(key)), hash(key.wrapping_add(1)));
+    let sharing = sharing(inputs, step, stage, index);
+    let of = |(n, other): (u32, u32)| {
+        if !sharing.contains(&other) {
+            return DVec3::ZERO;
+        }
         let Probe { hit, hit_r2, light, .. } = stage.probes[other as usize];
         let own = other == index;
         let r = if own { f64::from(hit_r2).sqrt() } else { hit.as_dvec3().distance(stage.position(index)) };
         let reached = own || r <= reach(matter);
-        if reached { light.as_dvec3() * shapes(matter, r) } else { DVec3::ZERO }
+        let u = unit(first.wrapping_add(GOLDEN.wrapping_mul(n)));
+        if reached { light.as_dvec3() * shapes_drawn(matter, r, node, u) } else { DVec3::ZERO }
     };
-    let sum: DVec3 = sharing(inputs, step, stage, index).into_iter().map(of).sum();
+    let members = members(inputs, step, Place::of(inputs, step, index));
+    let sum: DVec3 = (1..).zip(members).map(of).sum();
     Contribution::of(
         leaving(inputs, matter, matter, &seen(inputs, surface), surface) * matter.material.strength.as_dvec3() * sum,
     )

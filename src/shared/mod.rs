@@ -184,6 +184,10 @@ constants! {
     DIM_SINGLE_LIGHT: u32 = 18;
     /// Dimensions 20 and 21: point of an emitter for that point (a point per direction).
     DIM_SINGLE_EMITTER: u32 = 20;
+    /// Dimension of the hash that draws where tabulated profiles of a tile's hits are read.
+    DIM_REUSE: u32 = 22;
+    /// 2^32 over the golden ratio: the step of numbers that cover [0, 1) evenly.
+    GOLDEN: u32 = 0x9e37_79b9;
     /// Added to a dimension for what the place in a tile brings to it.
     DIM_PLACE: u32 = 32;
 

@@ -368,6 +368,7 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
 /// As [`super::Test::run`].
 pub fn reuse(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
     let mut verdict = Verdict::new(Bound::Relative(SHADING));
+    verdict.exempt = CHOICES;
     let mut lit = 0;
     for staged in staged.iter().filter(|staged| staged.case.prepared.features.reuse != 0) {
         let (name, inputs) = (&staged.case.name, staged.case.inputs());

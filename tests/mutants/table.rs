@@ -56,7 +56,7 @@ mutants! {
     "profile_better.glsl", "index", "profile.better": "sources + m.fluence * line" => "sources + m.fluence.x * line";
     "profile_burley.glsl", "constant", "profile.burley": "shift - x * (1.0 / 3.0)" => "shift - x * (1.0 / 2.0)";
     "profile_directional.glsl", "sign", "profile.directional": "w_no - 2.0 * w_n * n_no" => "w_no + 2.0 * w_n * n_no";
-    "profile_table.glsl", "swapped", "profile.table": "return mix(a, b, t);" => "return mix(b, a, t);";
+    "profile_table.glsl", "swapped", "profile.table": "mix(a, b, t);" => "mix(b, a, t);";
     "profile.glsl", "swapped branch", "profile.lambert":
         "table_obliqueness(m, m.slope, c, leaving)" => "table_obliqueness(m, m.slope, c, !leaving)";
     "mixture.glsl", "index", "profile.mixture": "x - float(k)" => "x - float(k + 1u)";
@@ -108,6 +108,12 @@ mutants! {
     "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (other == index || r2 <= probes[other].reach2) sum" => "sum";
     "sample.comp", "lost term", "kernel.sample": "probe.light = vec3(0.0);" => "";
     "reuse.comp", "index", "kernel.reuse": "probes[other].hit - surface.position" => "probes[index].hit - surface.position";
+    "profile_table.glsl", "swapped branch", "kernel.reuse": "u * (high - low) < bent - low ? 1u : 0u" =>
+        "u * (high - low) < bent - low ? 0u : 1u";
+    "profile_table.glsl", "lost condition", "kernel.reuse": "CURVATURE != 0 && u >= table_weight ? 1u : 0u" => "0u";
+    "reuse.comp", "off by one", "kernel.reuse": "turn += GOLDEN;
+            if (probes[other].share != share) continue;" => "if (probes[other].share != share) continue;
+            turn += GOLDEN;";
     "profile_table.glsl", "off by one", "kernel.accumulate": "table_base(m, m.table_nodes) + cell" => "table_base(m, m.table_nodes) + 1u + cell";
     "sample.comp", "sign", "kernel.sample": "probe.t_max = -b + half_chord;" => "probe.t_max = b + half_chord;";
     "sample.comp", "swapped branch", "kernel.sample":

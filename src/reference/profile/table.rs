@@ -250,6 +250,21 @@ pub(super) fn shapes(matter: Matter, r: f64) -> DVec3 {
     parts(matter).iter().map(|part| part.values(matter, r)).sum()
 }
 
+/// One value of the curvature that `node` draws, the one that u draws of the two around the distance.
+pub(super) fn drawn(matter: Matter, r: f64, node: f64, u: f64) -> DVec3 {
+    let parts = parts(matter);
+    let part = &parts[usize::from(node >= parts[0].weight)];
+    let (s, area) = part.bent(r * r);
+    let of = |c: usize| {
+        let column = Node::of(matter, part.node).column(c);
+        match column.place(s) {
+            Place::Cell { i, t, .. } => f64::from(column.values[i + usize::from(u < t)]),
+            place => column.value_in(place),
+        }
+    };
+    area * DVec3::from([0, 1, 2].map(of))
+}
+
 /// Density of the sampled radii per area of the plane.
 pub(super) fn density(matter: Matter, r: f64) -> f64 {
     let of = |part: &Part| {
