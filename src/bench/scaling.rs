@@ -115,19 +115,24 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// The power of the number of pixels, samples, triangles, materials or lights that the time of rendering grows with: the
-    /// slope of a line through the logarithms, by least squares. None for fewer than two points.
+    /// The power of the number of pixels, triangles, materials or lights that the time of a sample grows with, or of the number
+    /// of samples that the time of all grows with: the slope of a line through the logarithms, by least squares. None for fewer than two points.
     pub fn exponent(&self) -> Option<f64> {
         let size = |point: &Point| match self.axis {
             Axis::Resolution => point.pixels as f64,
             _ => point.value as f64,
         };
-        slope(self.points.iter().map(|point| (size(point).ln(), point.render.ln())))
+        slope(self.points.iter().map(|point| (size(point).ln(), self.time(point).ln())))
     }
 
-    /// The last point's time of rendering over the first's.
+    /// The last point's such time over the first's.
     pub fn ratio(&self) -> Option<f64> {
-        Some(self.points.last()?.render / self.points.first()?.render)
+        Some(self.time(self.points.last()?) / self.time(self.points.first()?))
+    }
+
+    /// What grows: the time of all samples where those are varied; else of one, as not all points have as many.
+    fn time(&self, point: &Point) -> f64 {
+        if self.axis == Axis::Samples { point.render } else { point.sample() }
     }
 
     fn json(&self) -> Value {

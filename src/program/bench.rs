@@ -302,15 +302,16 @@ fn scaled(run: &Scaling) -> String {
         rows.push(cells);
     }
     let mut text = aligned(&rows);
-    let grown = match run.axis {
-        Axis::Resolution => "pixels",
-        other => other.name(),
+    let (timed, grown) = match run.axis {
+        Axis::Resolution => ("a sample", "pixels"),
+        Axis::Samples => ("all samples", "samples"),
+        other => ("a sample", other.name()),
     };
     if let (Some(exponent), Some(ratio)) = (run.exponent(), run.ratio()) {
         // Text that cannot be written to a string does not exist; so below.
         let _ = writeln!(
             text,
-            "time of rendering: {grown} to the power of {exponent:.2}; the last takes {} times as long as the first",
+            "time of {timed}: {grown} to the power of {exponent:.2}; the last takes {} times as long as the first",
             significant(ratio)
         );
     }

@@ -405,6 +405,10 @@ fn the_exponent_is_that_of_a_power() {
         let resolution = Scaling { axis: Axis::Resolution, ..samples };
         assert!(near(resolution.exponent(), power / 2.0), "{resolution:?}");
     }
+    // Points of fewer samples are no faster for it.
+    let mut lights = Scaling { axis: Axis::Lights, points: points(1.0), skipped: vec![] };
+    (lights.points[0].samples, lights.points[0].render) = (4, 4.0 * lights.points[0].render);
+    assert!(near(lights.exponent(), 1.0) && near(lights.ratio(), 50.0), "{lights:?}");
     let one = Scaling { axis: Axis::Lights, points: vec![point(1, 1.0)], skipped: vec![] };
     assert_eq!((one.exponent(), one.ratio()), (None, Some(1.0)));
     // Two rows, whole and kernel, below the head.
