@@ -25,6 +25,8 @@ use std::{
 const SPACING: f64 = 0.5;
 /// Radius within which light is interpolated, in distances between points.
 const REACH: f64 = 2.5;
+/// Size over distance of triangles below which the profile at their middle stands for them.
+const SMALL: f64 = 0.2;
 /// Candidates for each point.
 const CANDIDATES: usize = 4;
 
@@ -152,8 +154,23 @@ fn lattice(count: usize) -> Vec<(f64, f64)> {
 /// faces as a point does.
 fn facing(tree: &Tree, point: &Cluster, reach: f64, inside: impl Fn(f64) -> DVec3) -> DVec3 {
     let (place, normal) = (point.position.as_dvec3(), point.normal.as_dvec3());
-    let faces = |[a, b, c]: &&Corners| (b - a).cross(c - a).dot(normal) > 0.0;
-    tree.near(place, reach).filter(faces).map(|corners| triangle(&inside, place, corners)).sum()
+    let part = |corners: &Corners| {
+        let [a, b, c] = *corners;
+        let twice = (b - a).cross(c - a);
+        if twice.dot(normal) <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let middle = (a + b + c) / 3.0;
+        let squared = middle.distance_squared(place);
+        let size = corners.map(|corner| corner.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
+        if size > SMALL * squared.sqrt() {
+            return triangle(&inside, place, corners);
+        }
+        // The profile there, as its mean over a ring about as wide as the triangle.
+        let half = size * squared.sqrt();
+        twice.length() / (4.0 * PI * half) * (inside(squared + half) - inside(squared - half))
+    };
+    tree.near(place, reach).map(part).sum()
 }
 
 /// `count` of a set's candidates, which is its area divided by: those that are left when the one with the nearest neighbours
