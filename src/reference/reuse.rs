@@ -10,7 +10,7 @@
 //!   Lo_i ~ Ft(wo) sum over j, x of  m_j(x) f_i(x) / p_j(x) E(x),     m_j(x) = G_j(x) / sum over k in T of G_k(x).
 //!
 //! The weights m_j add up to 1 at each x where any G_k > 0, so the expectation is that of each pixel alone, whatever the
-//! tile, if p_j > 0 wherever G_j > 0. That takes G_j = 0 beyond j's [reach](super::shared_hit::reach), where its profile
+//! tile, if p_j > 0 wherever G_j > 0. That takes G_j = 0 beyond j's [reach], where its profile
 //! ends or its probes do not look, and pixels of one set that are seen from one side: then the hits of one are hits of the
 //! other. Within its reach G_j is [about F_j](super::shared_hit::weight). One hit of each probe is lit, with the
 //! probability c / C, c = F_j / p_j, C the sum of c over the probe's hits, so that what is added is
