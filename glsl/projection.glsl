@@ -53,7 +53,7 @@ const uint TECHNIQUE_CAMERA = 3;
 // Fractions of the techniques normal, U, V and camera, from the cosine to the eye alone.
 vec4 technique_fractions(float cos_eye) {
     if (PROJECTION == PROJECTION_NORMAL) return vec4(1.0, 0.0, 0.0, 0.0);
-    if (PROJECTION == PROJECTION_CAMERA) return vec4(0.0, 0.0, 0.0, 1.0);
+    if (PROJECTION == PROJECTION_CAMERA || REPROJECT == REPROJECT_SCREEN) return vec4(0.0, 0.0, 0.0, 1.0);
     float s = clamp(cos_eye / 0.3, 0.0, 1.0);
     float camera = 0.4 * s * s * (3.0 - 2.0 * s);
     float rest = 1.0 - camera;
@@ -87,7 +87,8 @@ float mixture_density(Seen s, Material m, vec3 delta, vec3 n) {
         jacobians.w = cos_plane > 0.0 ? abs(dot(n, d)) / cos_plane * q * q : 0.0;
     }
     float p = 0.0;
-    [[dont_unroll]] for (uint k = 0u; k < (PROJECTION == PROJECTION_MIS ? 4u : 1u); k++) {
+    uint first = REPROJECT == REPROJECT_SCREEN ? TECHNIQUE_CAMERA : TECHNIQUE_NORMAL;
+    [[dont_unroll]] for (uint k = first; k < (PROJECTION == PROJECTION_MIS ? 4u : 1u); k++) {
         p += fractions[k] * radial_density(m, r2[k]) * jacobians[k];
     }
     return p;

@@ -8,6 +8,7 @@
 #include "texture.glsl"
 #include "intersect.glsl"
 SURFACES(readonly);
+#include "screen.glsl"
 PROBES(readonly);
 HIT_LISTS(writeonly);
 
@@ -21,8 +22,13 @@ void main() {
     uint set = has_probe ? triangles[surface.triangle].set : 0u;
     uint key = dimension_key(pixel_key(view.seed, pixel_position(view, index)), sample_index() % BATCHES, DIM_OVERFLOW)
         + hash(sample_index() / BATCHES);
-    traverse(Ray(surface.position, probe.offset, probe.direction, probe.t_min, probe.t_max),
-        PROJECTION == PROJECTION_CAMERA ? CLOSEST : ALL, set, key);
+    Ray ray = Ray(surface.position, probe.offset, probe.direction, probe.t_min, probe.t_max);
+    hit_count = 0u;
+    if (REPROJECT == REPROJECT_SCREEN) {
+        if (has_probe) look_up(view, ray, set);
+    } else {
+        traverse(ray, PROJECTION == PROJECTION_CAMERA ? CLOSEST : ALL, set, key);
+    }
 
     uint kept = min(hit_count, MAX_HITS);
     // Insertion sort: most lists hold one or two.

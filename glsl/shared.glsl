@@ -66,6 +66,13 @@ const uint PROJECTION_MIS = 0u;
 const uint PROJECTION_CAMERA = 1u;
 // Projection: the normal axis alone, all hits.
 const uint PROJECTION_NORMAL = 2u;
+// Reproject: rays are traced through the scene.
+const uint REPROJECT_TRACE = 0u;
+// Reproject: points are looked up in the G-buffer.
+const uint REPROJECT_SCREEN = 1u;
+// Looking up: pixels' widths between a hit in the plane of the triangle that a pixel sees and the point of it that the
+// pixel sees, at most.
+const float SCREEN_REACH = 4.0;
 // Model: the standard dipole of Jensen et al. 2001.
 const uint MODEL_STANDARD = 0u;
 // Model: the better dipole of d'Eon 2012.
@@ -284,6 +291,8 @@ layout(constant_id = 11) const uint MIXED = 0;
 layout(constant_id = 12) const uint INTEGRATOR = 0;
 // Width of the tiles in which pixels share their lit hits, a power of 2; 0 where they do not.
 layout(constant_id = 13) const uint REUSE = 0;
+// One of REPROJECT_*.
+layout(constant_id = 14) const uint REPROJECT = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {

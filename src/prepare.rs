@@ -15,7 +15,7 @@ use crate::{
     model::{self, Advice, Detail},
     reference::{Inputs, emitter, light, texture},
     scene::{self, Camera, EnvironmentMap, Frame, Lens, LightKind, Scene, Wrap},
-    settings::{Directional, Integrator, Projection, Settings},
+    settings::{Directional, Integrator, Projection, Reproject, Settings},
     shared::{
         self, Balance, Cluster, Coordinates, Emitter, Features, Light, MODEL_LAMBERT, Material, Mixture, Shading,
         TRANSLUCENT, Texture, Triangle, View,
@@ -168,6 +168,11 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     if ![1, 2, 4, 8].contains(&settings.reuse) {
         return Err(Error::setting("reuse", format!("{} is not 1, 2, 4 or 8", settings.reuse)));
     }
+    let looks_up = settings.integrator == Integrator::Sample && settings.reproject == Reproject::Screen;
+    if looks_up && settings.projection == Projection::Normal {
+        let problem = "knows what camera rays meet; the projection normal needs others: use mis or camera";
+        return Err(Error::setting("reproject screen", problem));
+    }
     if !(1..=65_536).contains(&settings.directions) {
         return Err(Error::setting("directions", format!("{} is not between 1 and 65536", settings.directions)));
     }
@@ -251,6 +256,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         recorded: u32::from(settings.recording),
         mixtures: u32::from(!mixtures.is_empty()),
         integrator: settings.integrator as u32,
+        reproject: if has_probes { settings.reproject as u32 } else { shared::REPROJECT_TRACE },
         reuse: if has_probes && shares_hits(settings, models, kinds, &mixtures) { settings.reuse } else { 0 },
         ..Features::default()
     };

@@ -16,6 +16,36 @@ pub enum Projection {
     Normal = shared::PROJECTION_NORMAL,
 }
 
+/// Where a sampled point meets the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Reproject {
+    /// Where a ray through the scene does.
+    #[default]
+    Trace = shared::REPROJECT_TRACE,
+    /// Where a G-buffer says: the camera ray through the point meets the surface that the pixel there sees. Fast, with a
+    /// bias: light that enters where the camera does not see is missing, as is what lies outside the image or the
+    /// [crop](Settings::crop), and the place is known to about a pixel, so
+    /// that it may lie below the surface where triangles meet, in their own shadow. Every probe takes the camera's technique, with
+    /// [`Projection::Mis`] from the profile's own radii; see [`reference::screen`](crate::reference::screen).
+    ///
+    /// The image is one band, whatever [`Settings::band_pixels`] says. Of [`Integrator::Sample`] alone; not for
+    /// [`Projection::Normal`], nor for an error as goal ([`Renderer::render_until`](crate::Renderer::render_until)).
+    Screen = shared::REPROJECT_SCREEN,
+}
+
+impl Reproject {
+    /// Every choice, with its name on the command line.
+    pub const NAMES: [(Reproject, &str); 2] = [(Reproject::Trace, "trace"), (Reproject::Screen, "screen")];
+}
+
+impl fmt::Display for Reproject {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (_, name) = Reproject::NAMES.iter().find(|(it, _)| it == self).expect("every choice has a name");
+        out.pad(name)
+    }
+}
+
 /// What computes the light that comes out of matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
@@ -241,6 +271,7 @@ pub struct Settings {
     /// Of [`Integrator::Cloud`] alone.
     pub cloud: Cloud,
     pub projection: Projection,
+    pub reproject: Reproject,
     pub normalisation: Normalisation,
     /// Profile of every translucent material; `Auto` leaves it to each.
     pub model: Model,
@@ -296,6 +327,7 @@ impl Default for Settings {
             integrator: Integrator::Sample,
             cloud: Cloud::default(),
             projection: Projection::Mis,
+            reproject: Reproject::Trace,
             normalisation: Normalisation::Energy,
             model: Model::Auto,
             directional: None,

@@ -48,9 +48,6 @@ pub struct Render {
     /// Stop when this time is used up, counted from the start of the program: 30s, 500ms, 2min, 1h.
     #[arg(long, value_name = "30s", value_parser = arguments::time)]
     time: Option<Duration>,
-    /// How surfaces are found: rays traced through the scene.
-    #[arg(long, default_value = "trace", value_parser = ["trace"])]
-    reproject: String,
     /// Layers to write beside R, G, B and A: all, or some of subsurface, reflection, variance, N, P, Z, samples,
     /// material, separated by commas.
     #[arg(long, value_name = "LIST|all", default_value = "all", value_delimiter = ',',

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
-    settings::{Cloud, Directional, Integrator},
+    settings::{Cloud, Directional, Integrator, Reproject},
     timeline::Timeline,
 };
 
@@ -34,6 +34,10 @@ pub struct Method {
     /// normal axis alone.
     #[arg(long, default_value = "mis", value_parser = projections())]
     projection: Projection,
+    /// How surfaces are found: trace rays through the scene / look the point up in the G-buffer (screen: fast, sees only what
+    /// the camera sees).
+    #[arg(long, default_value = "trace", value_parser = reprojects())]
+    reproject: Reproject,
     /// Width in pixels of the tiles that share the hits they light, which divides noise among them; 1 shares none.
     #[arg(long, value_name = "1|2|4|8", default_value = "8", value_parser = reuses())]
     reuse: u32,
@@ -129,6 +133,13 @@ pub fn projections() -> impl TypedValueParser<Value = Projection> {
     })
 }
 
+fn reprojects() -> impl TypedValueParser<Value = Reproject> {
+    PossibleValuesParser::new(Reproject::NAMES.map(|(_, name)| name)).map(|text| {
+        let found = Reproject::NAMES.into_iter().find(|(_, name)| *name == text);
+        found.expect("the parser passes names alone").0
+    })
+}
+
 fn reuses() -> impl TypedValueParser<Value = u32> {
     PossibleValuesParser::new(["1", "2", "4", "8"]).map(|width| width.parse().expect("the parser passes numbers alone"))
 }
@@ -181,8 +192,8 @@ impl SceneOptions {
 impl Method {
     /// `settings` with these options.
     pub fn settings(&self, settings: Settings) -> Settings {
-        let Method { directions, integrator, projection, reuse, model } = *self;
-        Settings { directions, integrator, projection, reuse, model, ..settings }
+        let Method { directions, integrator, projection, reproject, reuse, model } = *self;
+        Settings { directions, integrator, projection, reproject, reuse, model, ..settings }
     }
 }
 

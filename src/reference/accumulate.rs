@@ -25,7 +25,7 @@ use super::light::{self, FAR};
 use super::math::cosine_direction;
 use super::profile::{self, Directional, Matter, shapes, shapes_shifted};
 use super::projection::{
-    Seen, balance, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal,
+    Seen, balance, geometric_normal, inverse_scale, matter_at, mixture_density, seen, shading_normal, techniques,
 };
 use super::rough::{crossing, leaving_share};
 use super::sums::Contribution;
@@ -202,7 +202,7 @@ pub fn choose(
         .map(|j| {
             let delta = delta(probe, hits, j);
             let density = |material| {
-                mixture_density(inputs.features.projection, Matter { material, ..matter }, seen, delta, normal(j))
+                mixture_density(techniques(&inputs.features), Matter { material, ..matter }, seen, delta, normal(j))
             };
             let p = members.iter().map(density).sum::<f64>() / members.len() as f64;
             let local = local(j);

@@ -28,6 +28,7 @@ pub mod resolve;
 pub mod reuse;
 pub mod rough;
 pub mod sample;
+pub mod screen;
 pub mod shared_hit;
 pub mod single;
 pub mod strict;
@@ -113,10 +114,7 @@ pub fn render(inputs: &Inputs, rows: Range<u32>, samples: Range<u32>) -> Vec<Pix
         let (_, surfaces) = first[batch].as_ref().expect("traced above");
         let probe = |index| sample::sample(inputs, &step, index, &surfaces[index as usize]);
         let mut probes: Vec<Probe> = of_each().map(probe).collect();
-        let hit = |index| {
-            let (surface, probe) = (&surfaces[index as usize], &probes[index as usize]);
-            reproject::reproject(inputs, &step, index, surface, probe)
-        };
+        let hit = |index| screen::reproject(inputs, &step, index, surfaces, &probes[index as usize]);
         let hits: Vec<Hits> = of_each().map(hit).collect();
         if inputs.features.reuse != 0 {
             let stage = reuse::Stage { surfaces, probes: &probes };

@@ -27,7 +27,9 @@ use super::Inputs;
 use super::math::basis;
 use super::profile::{Matter, plane_density};
 use super::texture;
-use crate::shared::{MODEL_TABLE, Material, PROJECTION_CAMERA, PROJECTION_NORMAL, Surface, Triangle};
+use crate::shared::{
+    Features, MODEL_TABLE, Material, PROJECTION_CAMERA, PROJECTION_NORMAL, REPROJECT_SCREEN, Surface, Triangle,
+};
 use glam::DVec3;
 
 /// The techniques, in the order in which they are chosen.
@@ -130,6 +132,11 @@ pub fn balance(inputs: &Inputs, material: &Material, surface: &Surface) -> DVec3
 /// The material, with what its profile reads.
 pub fn matter_at<'a>(inputs: &Inputs<'a>, surface: &Surface) -> Matter<'a> {
     Matter { material: material(inputs, surface), tables: inputs.profiles, curvature: curvature(inputs, surface) }
+}
+
+/// The projection whose techniques find points; a G-buffer knows those of the camera alone.
+pub fn techniques(features: &Features) -> u32 {
+    if features.reproject == REPROJECT_SCREEN { PROJECTION_CAMERA } else { features.projection }
 }
 
 /// Fractions of the techniques at a point seen with cosine `cos`.

@@ -6,7 +6,7 @@
 //! sigma e^(-sigma r) / (2 pi r) with the one rate `camera_rate`, and follows the camera ray from the eye.
 
 use super::profile::{self, Matter, draw_radius};
-use super::projection::{CAMERA, fractions, matter_at, seen};
+use super::projection::{CAMERA, fractions, matter_at, seen, techniques};
 use super::shared_hit::reach;
 use super::tile::{Place, coordinate, first_share};
 use super::{Inputs, mixture};
@@ -53,7 +53,7 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
     let (material, u_component) = mixture::pick(&members, u(DIM_COMPONENT));
     let given = inputs.features.projection == PROJECTION_CAMERA;
 
-    let fractions = fractions(inputs.features.projection, seen.normal.dot(seen.wo));
+    let fractions = fractions(techniques(&inputs.features), seen.normal.dot(seen.wo));
     let technique = first_above(u(DIM_TECHNIQUE), &fractions);
 
     let r = if given {

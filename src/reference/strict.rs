@@ -9,7 +9,7 @@
 use super::Inputs;
 use super::pixel::position;
 use super::random::{batch, key, scramble, sobol, stratum, unit};
-use crate::shared::{DIM_PIXEL, MISS, PROJECTION_CAMERA, Probe, Step, Surface, Triangle};
+use crate::shared::{DIM_PIXEL, MISS, PROJECTION_CAMERA, Probe, SCREEN_REACH, Step, Surface, Triangle};
 use glam::{Vec2, Vec3, Vec3Swizzles, vec2};
 
 /// What stands for the area of a ray through an edge.
@@ -112,6 +112,41 @@ pub fn primary(inputs: &Inputs, step: &Step, index: u32) -> Surface {
     let [corner, second, third] = inputs.triangles[hit.triangle as usize].vertices;
     let from_corner = hit.barycentric.x * (second - corner) + hit.barycentric.y * (third - corner);
     Surface { position: corner + from_corner, triangle: hit.triangle, barycentric: hit.barycentric }
+}
+
+/// As [`look_up`](super::screen::look_up).
+pub fn look_up(inputs: &Inputs, step: &Step, index: u32, surfaces: &[Surface], probe: &Probe) -> Vec<Hit> {
+    let view = inputs.view;
+    if probe.t_min > probe.t_max {
+        return vec![];
+    }
+    let own = &surfaces[index as usize];
+    let depth =
+        |from_pivot: Vec3| 1.0 + view.perspective * (from_pivot.dot(view.forward) / view.forward.dot(view.forward));
+    let from_pivot = (own.position - view.pivot) + probe.offset;
+    let x = from_pivot.dot(view.right) / view.right.dot(view.right) / depth(from_pivot);
+    let y = from_pivot.dot(view.up) / view.up.dot(view.up) / depth(from_pivot);
+    let column = (0.5 + 0.5 * x) * view.width as f32 - view.crop_x as f32;
+    let row = (0.5 - 0.5 * y) * view.height as f32 - step.first_row as f32;
+    let (columns, rows) = (view.crop_width as f32, (step.pixel_count / view.crop_width) as f32);
+    if !(depth(from_pivot) > 0.0 && (0.0..columns).contains(&column) && (0.0..rows).contains(&row)) {
+        return vec![];
+    }
+    let there = &surfaces[row as usize * view.crop_width as usize + column as usize];
+    let set = |surface: &Surface| inputs.triangles[surface.triangle as usize].set;
+    if there.triangle == MISS || set(there) != set(own) {
+        return vec![];
+    }
+    let to = (there.position - own.position) - probe.offset;
+    let [corner, second, third] = inputs.triangles[there.triangle as usize].vertices;
+    let normal = (second - corner).cross(third - corner);
+    let in_plane = normal.dot(to) / normal.dot(probe.direction);
+    let apart = in_plane * probe.direction - to;
+    let width = 2.0 * view.right.length() / view.width as f32 * depth(there.position - view.pivot) * SCREEN_REACH;
+    let t = if apart.dot(apart) <= width * width { in_plane } else { to.dot(probe.direction) };
+    let found = t >= probe.t_min && t <= probe.t_max;
+    let hit = Hit { t, triangle: there.triangle, barycentric: there.barycentric };
+    found.then_some(hit).into_iter().collect()
 }
 
 /// All hits of [`reproject`](super::reproject::reproject), by distance.

@@ -21,7 +21,7 @@ use crate::{
     gpu::upload,
     image::FLOOR_OF_MEAN,
     settings::Integrator,
-    shared::{ACTIVE_HEADER, BATCHES, Slot, Sums},
+    shared::{ACTIVE_HEADER, BATCHES, REPROJECT_SCREEN, Slot, Sums},
     timeline,
 };
 use glam::Vec3;
@@ -119,8 +119,8 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::render_range`]; [`Error::Setting`] for a goal that is out of range, or an error as goal of a
-    /// renderer that was made without [`Settings::estimate_error`](crate::Settings::estimate_error), records, computes
-    /// on the host, or gathers from a cloud, whose error all samples share.
+    /// renderer that was made without [`Settings::estimate_error`](crate::Settings::estimate_error), records, looks points up
+    /// in the G-buffer, computes on the host, or gathers from a cloud, whose error all samples share.
     pub fn render_until(
         &mut self,
         goal: &Goal,
@@ -137,6 +137,10 @@ impl Renderer {
                 }
                 _ if self.settings.integrator.is_on_host() => {
                     format!("is no goal of the integrator {}: it works on all pixels", self.settings.integrator)
+                }
+                _ if self.prepared.features.reproject == REPROJECT_SCREEN => {
+                    "is no goal of reproject screen: pixels look into the G-buffer of all, which is traced as a whole"
+                        .into()
                 }
                 _ if self.settings.recording => "is no goal of a renderer that records".into(),
                 _ if !self.settings.estimate_error => "needs `estimate_error` in the renderer's settings".into(),

@@ -232,6 +232,7 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
             serde_json::json!([points, opening, samples])
         }),
         "reuse": settings.reuse,
+        "reproject": settings.reproject.to_string(),
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
         "model": settings.model.to_string(),

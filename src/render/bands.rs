@@ -5,7 +5,7 @@ use crate::{
     error::{Error, Result},
     prepare::Prepared,
     settings::Settings,
-    shared::{ACTIVE_HEADER, BATCHES, Features, GATHER_POINTS, Slot},
+    shared::{ACTIVE_HEADER, BATCHES, Features, GATHER_POINTS, REPROJECT_SCREEN, Slot},
 };
 
 /// Pixels of a band where nothing else limits it: enough to fill a GPU, few enough for a processor's caches.
@@ -115,7 +115,9 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     // Half of the memory is left to the scene and to others. Whether it suffices at all is asked later.
     let memory = limits.heap_bytes.min(if limits.shared { limits.host_bytes } else { u64::MAX });
     let pixels = if prepared.on_host { HOST_PIXELS } else { BAND_PIXELS };
-    let wanted = match settings.recording {
+    // A point may lie in any pixel of the G-buffer.
+    let looks_up = prepared.features.reproject == REPROJECT_SCREEN;
+    let wanted = match settings.recording || looks_up {
         true => u64::MAX,
         false => u64::from(settings.band_pixels.unwrap_or(pixels)).min(memory / 2 / whole),
     };
@@ -128,10 +130,11 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let rows = prepared.rows.end - prepared.rows.start;
     let most = (wanted.min(limit) / u64::from(width)).clamp(1, u64::from(rows)) as u32;
     let count = rows.div_ceil(most);
-    if settings.recording && count > 1 {
+    if (settings.recording || looks_up) && count > 1 {
         let problem =
             format!("{rows} rows of {width} pixels need more than the device binds; lower the resolution or crop");
-        return Err(Error::Memory { step: "make one band for recordings".into(), problem });
+        let step = format!("make one band for {}", if looks_up { "reproject screen" } else { "recordings" });
+        return Err(Error::Memory { step, problem });
     }
     Ok((0..count)
         .map(|band| {

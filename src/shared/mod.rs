@@ -81,6 +81,14 @@ constants! {
     /// Projection: the normal axis alone, all hits.
     PROJECTION_NORMAL: u32 = 2;
 
+    /// Reproject: rays are traced through the scene.
+    REPROJECT_TRACE: u32 = 0;
+    /// Reproject: points are looked up in the G-buffer.
+    REPROJECT_SCREEN: u32 = 1;
+    /// Looking up: pixels' widths between a hit in the plane of the triangle that a pixel sees and the point of it that the
+    /// pixel sees, at most.
+    SCREEN_REACH: f32 = 4.0;
+
     /// Model: the standard dipole of Jensen et al. 2001.
     MODEL_STANDARD: u32 = 0;
     /// Model: the better dipole of d'Eon 2012.
@@ -760,6 +768,8 @@ features! {
     integrator = 12: INTEGRATOR,
     /// Width of the tiles in which pixels share their lit hits, a power of 2; 0 where they do not.
     reuse = 13: REUSE,
+    /// One of REPROJECT_*.
+    reproject = 14: REPROJECT,
 }
 
 impl Features {

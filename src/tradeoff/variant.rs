@@ -1,12 +1,15 @@
 //! The ways in which a scene is rendered.
 
-use crate::settings::{Integrator, Model, Projection, Settings};
+use crate::settings::{Integrator, Model, Projection, Reproject, Settings};
 
 /// A value of an axis by its name on the command line, and what it changes in the settings.
 pub type Choice = (&'static str, fn(&mut Settings));
 
 /// How surfaces are found, the default first.
-pub const REPROJECT: &[Choice] = &[("trace", |_| {})];
+pub const REPROJECT: &[Choice] = &[
+    ("trace", |settings| settings.reproject = Reproject::Trace),
+    ("screen", |settings| settings.reproject = Reproject::Screen),
+];
 
 /// How light at the sampled point is found, the default first.
 pub const IRRADIANCE: &[Choice] = &[("direct", |_| {})];

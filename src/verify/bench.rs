@@ -29,6 +29,7 @@ const EVERYTHING: Features = Features {
     listed: 0,
     mixtures: 0,
     reuse: 0,
+    reproject: REPROJECT_TRACE,
     integrator: INTEGRATOR_SAMPLE,
 };
 

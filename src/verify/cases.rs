@@ -6,7 +6,7 @@ use crate::{
     prepare::{Prepared, prepare},
     reference::Inputs,
     scene::{Environment, EnvironmentMap, LoadOptions, Scene},
-    settings::{Cloud, Directional, Integrator, Model, Projection, Settings, SingleScattering},
+    settings::{Cloud, Directional, Integrator, Model, Projection, Reproject, Settings, SingleScattering},
 };
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -142,6 +142,7 @@ pub fn cases() -> Result<Vec<Case>> {
     }
     cases.push(mixed()?);
     cases.extend(tiled()?);
+    cases.extend(looked_up()?);
     Ok(cases)
 }
 
@@ -193,6 +194,26 @@ fn tiled() -> Result<Vec<Case>> {
         materials[1] = matter([2.0, 3.0, 4.0], [0.3, 0.2, 0.1], 1.3);
         let scene = still_life(&materials, light)?;
         cases.push(Case::new(name, scene, &Settings { model, reuse, ..settings(seed) })?);
+    }
+    Ok(cases)
+}
+
+/// Scenes in which points are looked up in the G-buffer: radii of the profile and of the camera's exponential, and tiles.
+fn looked_up() -> Result<Vec<Case>> {
+    let list = [
+        ("burley, screen, mis, uniform light", Model::Burley, Projection::Mis, Light::Constant, 1),
+        ("standard, screen, camera, delta lights", Model::Standard, Projection::Camera, Light::Delta, 1),
+        ("table, screen, tiles of 4, delta lights", Model::Table, Projection::Mis, Light::Delta, 4),
+    ];
+    let mut cases = vec![];
+    for (seed, (name, model, projection, light, reuse)) in (31..).zip(list) {
+        let mut materials = materials();
+        materials[0]["extras"]["bssrdf"]["ior"] = json!(1.3);
+        // Another set behind the ball's rim.
+        materials[1] = matter([2.0, 3.0, 4.0], [0.3, 0.2, 0.1], 1.3);
+        let scene = still_life(&materials, light)?;
+        let reproject = Reproject::Screen;
+        cases.push(Case::new(name, scene, &Settings { model, projection, reproject, reuse, ..settings(seed) })?);
     }
     Ok(cases)
 }

@@ -11,10 +11,10 @@ use crate::{
         primary::primary as twin_primary,
         random,
         reflect::reflect as twin_reflect,
-        reproject::reproject as twin_reproject,
         resolve::resolve as twin_resolve,
         reuse::{Lit, Stage, light, reuse as twin_reuse},
         sample::sample as twin_sample,
+        screen::reproject as twin_reproject,
         single::single as twin_single,
         strict,
         sums::Contribution,
@@ -54,7 +54,7 @@ impl Staged {
         let pixels = || (0..step.pixel_count).into_par_iter();
         let surfaces: Vec<_> = pixels().map(|i| twin_primary(&inputs, &step, i)).collect();
         let probes: Vec<_> = pixels().map(|i| twin_sample(&inputs, &step, i, &surfaces[i as usize])).collect();
-        let hits = pixels().map(|i| twin_reproject(&inputs, &step, i, &surfaces[i as usize], &probes[i as usize]));
+        let hits = pixels().map(|i| twin_reproject(&inputs, &step, i, &surfaces, &probes[i as usize]));
         let hits: Vec<Hits> = hits.collect();
         let stage = Stage { surfaces: &surfaces, probes: &probes };
         let lit = pixels().map(|i| light(&inputs, &step, i, &stage, &hits[i as usize]));
@@ -285,8 +285,12 @@ pub fn reproject(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         ];
         let loaded = staged.run(context, "reproject", &buffers)?;
         let found: Vec<Hits> = context.bench.read(&loaded, Slot::HitLists)?;
-        let expected: Vec<Vec<strict::Hit>> = (staged.surfaces.par_iter().zip(&staged.probes))
-            .map(|(surface, probe)| strict::reproject(&inputs, surface, probe))
+        let looks_up = inputs.features.reproject == REPROJECT_SCREEN;
+        let expected: Vec<Vec<strict::Hit>> = (staged.surfaces.par_iter().zip(&staged.probes).enumerate())
+            .map(|(i, (surface, probe))| match looks_up {
+                true => strict::look_up(&inputs, &staged.step, i as u32, &staged.surfaces, probe),
+                false => strict::reproject(&inputs, surface, probe),
+            })
             .collect();
         let mut far = 0;
         for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {

@@ -21,6 +21,7 @@ mod references;
 mod repeatable;
 mod reuse;
 mod scenes;
+mod screen;
 mod single;
 mod statistics;
 mod table;

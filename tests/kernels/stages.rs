@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use translucent::{
     Model, Projection, Result, Scene, Settings, SingleScattering,
     scene::{Environment, EnvironmentMap, LightKind},
-    settings::Directional,
+    settings::{Directional, Reproject},
     verify::{
         Case, Context, Verdict,
         stages::{self, SAMPLES, Staged},
@@ -113,6 +113,17 @@ fn cases() -> Vec<Case> {
             ..Settings::default()
         };
         cases.push(case(format!("{model}, {projection:?}"), scene, &settings));
+    }
+    for projection in [Projection::Mis, Projection::Camera] {
+        let settings = Settings {
+            resolution: Some(FULL),
+            crop: Some(CROP),
+            projection,
+            reproject: Reproject::Screen,
+            seed: 7,
+            ..standard()
+        };
+        cases.push(case(format!("{projection:?}, screen"), demo.clone(), &settings));
     }
     for projection in [Projection::Mis, Projection::Normal, Projection::Camera] {
         let single_scattering = SingleScattering::On;

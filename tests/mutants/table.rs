@@ -121,6 +121,8 @@ mutants! {
     "reproject.comp", "order", "kernel.reproject": "hit_t[j - 1] > t" => "hit_t[j - 1] < t";
     "reproject.comp", "swapped branch", "kernel.reproject":
         "PROJECTION == PROJECTION_CAMERA ? CLOSEST : ALL" => "PROJECTION == PROJECTION_CAMERA ? ALL : CLOSEST";
+    "screen.glsl", "sign", "kernel.reproject": "(0.5 - 0.5 * y)" => "(0.5 + 0.5 * y)";
+    "screen.glsl", "lost condition", "kernel.reproject": "if (triangle.set != set) return;" => "";
     "arriving.glsl", "lost factor", "kernel.irradiance":
         "light = incoming.irradiance * max(dot(shading_n, direction), 0.0);" => "light = incoming.irradiance;";
     "accumulate.comp", "lost factor", "kernel.accumulate": "if (MIXED != 0) radiance *= m.exit;" => "";
