@@ -13,9 +13,9 @@
 //! # Bias
 //! What the camera does not see brings no light: half of a sphere at its silhouette, nothing on a plane that fills the
 //! image. A pixel with two surfaces has them by turns, as its strata do, so that their shares hold in the mean. The place of
-//! a hit is wrong by about a pixel's width where several triangles share it; where
-//! those meet in a hollow, the extended plane lies below the surface and in its shadow: an error of the order of a pixel over
-//! the triangles' size.
+//! a hit is wrong by about a pixel's width where several triangles share it; where those meet in a hollow, the extended plane
+//! lies below the surface, and may be in its shadow: an error that would fall with a pixel over the triangles' size, as what
+//! is measured does.
 
 use super::{Inputs, reproject as traced};
 use crate::shared::{Hits, MISS, Probe, REPROJECT_SCREEN, SCREEN_REACH, Step, Surface, View};
