@@ -59,7 +59,7 @@ vec3 table_value(Material m, uint node, float r2) {
     if (!before && cell - m.table_first >= uint(profiles[base + 1u])) return vec3(0.0);
     float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
     float t = (r2 - low) / (high - low);
-    // Before the first cell the light within it counts; a branch of its own would read on every device's lanes.
+    // Before the first cell the light within it counts; a branch would read both on a device whose lanes take all.
     uint i = base + TABLE_HEADER + (before ? nodes : cell - m.table_first);
     vec3 a = vec3(profiles[i], profiles[i + 2u * nodes], profiles[i + 4u * nodes]);
     i += before ? 0u : 1u;

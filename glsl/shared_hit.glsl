@@ -1,5 +1,5 @@
-// What a lit hit brings to the pixels of its tile. The mathematics is in src/reference/shared_hit.rs and
-// reuse.rs.
+// What a lit hit brings to the pixels of its tile. The mathematics is in src/reference/shared_hit.rs
+// and reuse.rs.
 
 // The tabulated profile is that at a pixel's surface.
 void table_of(Probe probe) {

@@ -61,8 +61,7 @@ impl Counts {
     }
 }
 
-/// Renders `samples` samples and the image by kernels with counters in each of their blocks and
-/// says what each did. Lists of pixels, branches and loops are those of the render. Nothing on a device without
+/// Renders `samples` samples and the image by kernels with counters and says what each did. Lists of pixels, branches and loops are those of the render. Nothing on a device without
 /// timestamps, which say how often kernels were dispatched.
 ///
 /// # Errors

@@ -115,8 +115,9 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// The power of the number of pixels, triangles, materials or lights that the time of a sample grows with, or of the number
-    /// of samples that the time of all grows with: the slope of a line through the logarithms, by least squares. None for fewer than two points.
+    /// The power of the number of pixels, triangles, materials or lights that the time of a sample grows with, or of the
+    /// number of samples that the time of all grows with: the slope of a line through the logarithms, by least squares.
+    /// None for fewer than two points.
     pub fn exponent(&self) -> Option<f64> {
         let size = |point: &Point| match self.axis {
             Axis::Resolution => point.pixels as f64,

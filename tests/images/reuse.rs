@@ -11,7 +11,8 @@ use translucent::{Model, Scene, Settings, scene::Environment};
 
 const SIDE: u32 = 24;
 
-/// A step, of two bodies that touch, and a ball of another set: edges, shadows, silhouettes and neighbours that share nothing lie within tiles.
+/// A step, of two bodies that touch, and a ball of another set: edges, shadows, silhouettes and neighbours that share
+/// nothing lie within tiles.
 fn still_life(sigma_s_prime: f64) -> Scene {
     let mut step = Mesh::default();
     step.cuboid(DVec3::new(-1.5, -1.5, -1.0), DVec3::new(0.0, 1.5, 0.0), 1);

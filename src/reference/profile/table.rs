@@ -337,8 +337,7 @@ impl<'a> Local<'a> {
     /// Distance beyond which there is nothing.
     pub fn end(&self) -> f64 {
         let of = |(part, columns): &(Part, [Column; 3])| {
-            let reached = f64::from(grid::node(columns[0].first + columns[0].reached as u32)).sqrt();
-            if part.bend == 0.0 { reached } else { part.scale.sqrt().recip() }
+            part.unbent(f64::from(grid::node(columns[0].first + columns[0].reached as u32)))
         };
         self.parts.iter().map(of).fold(0.0, f64::max)
     }
