@@ -21,6 +21,7 @@ SURFACES(readonly);
 PROBES(read_write);
 HIT_LISTS(readonly);
 #include "mixture.glsl"
+#include "cached.glsl"
 #include "shared_hit.glsl"
 
 // Weights of the second and third vertex at a point of a triangle, relative to its first.
@@ -87,6 +88,9 @@ void main() {
         table_at(m, surface);
     }
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
+    bool cached = IRRADIANCE == IRRADIANCE_CACHED && s.side > 0.0 && !has_model(m, MODEL_LAMBERT);
+    // It has the light of all rays.
+    if (cached && step_.ray_begin != 0u) return;
     uint batch = sample_index() % BATCHES;
     Place place = place_of(view, index, batch);
     uint key = pixel_key(view.seed, place.tile);
@@ -154,8 +158,8 @@ void main() {
     vec3 position = s.position + delta;
     float entry_share = roughness_share(lit, barycentric);
 
-    vec3 entering = vec3(0.0);
-    for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
+    vec3 entering = cached ? cached_light(local, lit, barycentric) : vec3(0.0);
+    for (uint k = step_.ray_begin; !cached && k < step_.ray_begin + step_.ray_count; k++) {
         vec3 direction;
         vec3 light = arriving(view, k, position, n, shading_n, place, key, batch,
             sample_index() / BATCHES, direction);

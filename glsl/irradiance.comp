@@ -1,4 +1,4 @@
-// Adds the light of shadow rays to one point of the cloud. The mathematics is in src/reference/irradiance.rs.
+// Adds the light of shadow rays to one point whose light is kept, as of the cloud. The mathematics is in src/reference/irradiance.rs.
 #version 460
 #include "shared.glsl"
 #include "math.glsl"
@@ -21,12 +21,13 @@ void main() {
     uint index = pixel_index();
     if (index >= step_.pixel_count) return;
     View view = views[0];
-    Cluster point = clusters[view.leaves + index];
+    uint number = step_.node + index;
+    Cluster point = clusters[number];
     if (point.area == 0.0) return;
     Material m = materials[shadings[point.triangle].material];
     vec3 shading_n = shading_normal(shadings[point.triangle], point.triangle, point.barycentric);
     float share = roughness_share(point.triangle, point.barycentric);
-    Place place = Place(uvec2(index, POINTS_ROW), 0u);
+    Place place = Place(uvec2(index, POINTS_ROW - step_.first_row), 0u);
     uint key = pixel_key(view.seed, place.tile);
     vec3 flux = vec3(0.0), oblique = vec3(0.0);
     for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
@@ -43,7 +44,8 @@ void main() {
         }
     }
     vec3 tint = vec3(point.area);
-    if (has_texture(TEXTURE_BASE_COLOR)) tint *= texture_value(TEXTURE_BASE_COLOR, point.triangle, point.barycentric).rgb;
-    clusters[view.leaves + index].flux = point.flux + flux * tint;
-    clusters[view.leaves + index].oblique = point.oblique + oblique * tint;
+    // Between points pixels bring their own.
+    if (IRRADIANCE != IRRADIANCE_CACHED && has_texture(TEXTURE_BASE_COLOR)) tint *= texture_value(TEXTURE_BASE_COLOR, point.triangle, point.barycentric).rgb;
+    clusters[number].flux = point.flux + flux * tint;
+    clusters[number].oblique = point.oblique + oblique * tint;
 }

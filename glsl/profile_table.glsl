@@ -1,7 +1,6 @@
 // Profiles tabulated by simulation. The mathematics is in src/reference/profile/table.rs, the layout of the numbers in
 // src/table/block.rs.
 PROFILES(readonly);
-THICKNESS(readonly);
 BALANCES(readonly);
 
 // The curvatures of the table around that of the surface that is seen: the first of two, its weight, how distances bend
@@ -23,7 +22,7 @@ void table_at(Material m, Surface surface) {
     table_bend = vec2(0.0);
     if (CURVATURE == 0) return;
     vec2 b = surface.barycentric;
-    float curvature = dot(thickness[surface.triangle], vec3(1.0 - b.x - b.y, b));
+    float curvature = dot(balances[m.balance + surface.triangle].curvature, vec3(1.0 - b.x - b.y, b));
     table_scale = 0.25 * curvature * curvature;
     uint above = 0u;
     while (above < min(m.table_nodes, TABLE_NODES) && profiles[table_base(m, above)] > curvature) above++;

@@ -70,6 +70,10 @@ const uint PROJECTION_NORMAL = 2u;
 const uint REPROJECT_TRACE = 0u;
 // Reproject: points are looked up in the G-buffer.
 const uint REPROJECT_SCREEN = 1u;
+// Irradiance: shadow rays from each hit.
+const uint IRRADIANCE_DIRECT = 0u;
+// Irradiance: interpolated between points of the surface, which are lit once.
+const uint IRRADIANCE_CACHED = 1u;
 // Looking up: pixels' widths between a hit in the plane of the triangle that a pixel sees and the point of it that the
 // pixel sees, at most.
 const float SCREEN_REACH = 4.0;
@@ -293,6 +297,8 @@ layout(constant_id = 12) const uint INTEGRATOR = 0;
 layout(constant_id = 13) const uint REUSE = 0;
 // One of REPROJECT_*.
 layout(constant_id = 14) const uint REPROJECT = 0;
+// One of IRRADIANCE_*.
+layout(constant_id = 15) const uint IRRADIANCE = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {
@@ -375,7 +381,8 @@ struct Step {
     uint range_begin;
     // End of those that light the cloud.
     uint range_end;
-    // Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from.
+    // Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from. The first of the
+    // points that `irradiance` lights.
     uint node;
     // The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
     uint point[5];
@@ -495,13 +502,15 @@ struct Material {
     vec3 exit;
 };
 
-// Factor on a material's tabulated profile at a triangle, with which it gives back what its sphere does.
+// What a material's tabulated profile needs of a triangle, at the three vertices.
 struct Balance {
-    // At the three vertices.
+    // Factors with which the profile gives back what its sphere does.
     vec3 at[3];
+    // 1 over the radius of the sphere that the body resembles there.
+    vec3 curvature;
 };
 
-// A point of the cloud (a leaf), or what the points below a node of its tree have in common.
+// A point whose light is kept, as of the cloud (a leaf), or what the points below a node of its tree have in common.
 struct Cluster {
     // Of several points, the mean by flux.
     vec3 position;
@@ -524,6 +533,16 @@ struct Cluster {
     // Of a leaf: its triangle, and the weights of the second and third vertex.
     uint triangle;
     vec2 barycentric;
+};
+
+// Points of a triangle whose light is kept: b1 = i / cells, b2 = j / cells with whole numbers i + j <= cells.
+struct Lattice {
+    // Cells along each edge; 0 for a triangle that lets no light in, or is in the opaque limit.
+    uint cells;
+    // The points at its three vertices, which triangles around a vertex share.
+    uint corners[3];
+    // The first of its others: by rising j, then i.
+    uint first;
 };
 
 // What a pixel has gathered so far.
@@ -723,8 +742,8 @@ struct Pixel {
 #define COORDINATES(access) layout(set = 0, binding = 19, scalar) access buffer CoordinatesBlock { Coordinates coordinates[]; }
 // Tabulated profiles of the materials that have them; see `table::block`.
 #define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { float profiles[]; }
-// At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
-#define THICKNESS(access) layout(set = 0, binding = 21, scalar) access buffer ThicknessBlock { vec3 thickness[]; }
+// Where the light of each triangle is kept.
+#define LATTICES(access) layout(set = 0, binding = 21, scalar) access buffer LatticesBlock { Lattice lattices[]; }
 // Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
 #define BOUNDARIES(access) layout(set = 0, binding = 22, scalar) access buffer BoundariesBlock { float boundaries[]; }
 // One Progress.
@@ -737,7 +756,8 @@ struct Pixel {
 #define MIXTURES(access) layout(set = 0, binding = 26, scalar) access buffer MixturesBlock { Mixture mixtures[]; }
 // Balances of each triangle, once for as many materials as its set has.
 #define BALANCES(access) layout(set = 0, binding = 27, scalar) access buffer BalancesBlock { Balance balances[]; }
-// The cloud's tree: node i has the children 2 i and 2 i + 1, the leaves are the second half; node 0 is none.
+// The cloud's tree: node i has the children 2 i and 2 i + 1, the leaves are the second half; node 0 is none. Or the
+// points of Lattices.
 #define CLUSTERS(access) layout(set = 0, binding = 28, scalar) access buffer ClustersBlock { Cluster clusters[]; }
 // One per pixel of the band, where a cloud is gathered by several dispatches.
 #define GATHERS(access) layout(set = 0, binding = 29, scalar) access buffer GathersBlock { Gather gathers[]; }

@@ -31,7 +31,7 @@
 //!    geometry centred and   internal  Lights Environment EnvironmentCdf ─────► buffers   per scene
 //!    scaled)                units)    Emitters Boundaries
 //!                                     Texels Textures Coordinates
-//!                                     Profiles Thickness Balances Mixtures
+//!                                     Profiles Balances Mixtures Lattices
 //!                                     View ──────────────────────────────────► buffer    per render
 //!
 //!   ┌── per sub-pixel stratum ──┐ ┌──────────── per sample (Step in push constants) ───────────┐ ┌─ at the end ─┐
@@ -44,6 +44,11 @@
 //!   ┌─── when the lights change ───┐               ┌──────── per sample ────────┐
 //!   irradiance      cluster                        gather
 //!   └► Clusters     └► Clusters above them         └► RunningSums, BatchSums
+//!
+//!   Irradiance::Cached, in place of accumulate's shadow rays:
+//!   ┌─── when the lights change ───┐               ┌──────── per sample ────────┐
+//!   irradiance, until fine enough                  accumulate looks it up
+//!   └► Clusters, Lattices
 //!
 //!   Integrator::Area and Integrator::Walk, in place of sample, reproject and accumulate, on the host:
 //!                                                  ┌──────── per sample ────────┐
@@ -120,6 +125,7 @@
 #![deny(unsafe_code)]
 
 pub mod bench;
+pub mod cache;
 pub mod curvature;
 pub mod error;
 #[doc = include_str!("docs/extremes.md")]

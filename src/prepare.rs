@@ -2,6 +2,7 @@
 
 mod cloud;
 mod host;
+mod kept;
 mod matter;
 mod sets;
 
@@ -11,6 +12,7 @@ pub(crate) use matter::replaced;
 use matter::Matter;
 
 use crate::{
+    cache::Cache,
     error::{Error, Result},
     model::{self, Advice, Detail},
     reference::{Inputs, emitter, light, texture},
@@ -40,14 +42,14 @@ pub struct Prepared {
     pub textures: Vec<Texture>,
     /// Tabulated profiles, none without the table model.
     pub profiles: Vec<f32>,
-    /// Curvatures at the vertices of each triangle, none where no profile depends on them.
-    pub thickness: Vec<Vec3>,
     /// Balances of profiles and triangles, none where no profile depends on curvatures.
     pub balances: Vec<Balance>,
     /// Media of each set, none where no set holds several materials.
     pub mixtures: Vec<Mixture>,
     /// The cloud's tree, not lit yet; none without light that is gathered.
     pub clusters: Vec<Cluster>,
+    /// Points whose light is kept, not lit yet, and room for those that come; none where shadow rays find the light.
+    pub cache: Cache,
     /// The model of each material and why it; none for opaque ones.
     pub advice: Vec<Option<Advice>>,
     /// The camera that looks, for what is said about the image.
@@ -105,9 +107,10 @@ impl Prepared {
             textures: &self.textures,
             coordinates,
             profiles: &self.profiles,
-            thickness: &self.thickness,
             balances: &self.balances,
             mixtures: &self.mixtures,
+            kept: &self.cache.points,
+            lattices: &self.cache.lattices,
             tree: None,
         }
     }
@@ -196,7 +199,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         Some(Before { prepared, .. }) => Matter::of(prepared),
         None => Matter::new(scene, settings, &advice)?,
     };
-    let Matter { materials, profiles, boundaries, rough_rows, thickness, balances, mixtures, clusters } = matter;
+    let Matter { materials, profiles, boundaries, rough_rows, balances, mixtures, clusters, cache } = matter;
     let lights: Vec<Light> = scene.lights.iter().map(|l| delta_light(l, frame)).collect();
     let emitters = emitter::table(&scene.triangles, &scene.shadings, &materials);
 
@@ -252,11 +255,12 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         emitters: u32::from(emits),
         textures: kinds,
         rough: rough_rows,
-        curvature: u32::from(!thickness.is_empty()),
+        curvature: u32::from(!balances.is_empty()),
         recorded: u32::from(settings.recording),
         mixtures: u32::from(!mixtures.is_empty()),
         integrator: settings.integrator as u32,
         reproject: if has_probes { settings.reproject as u32 } else { shared::REPROJECT_TRACE },
+        irradiance: if has_probes { settings.irradiance as u32 } else { shared::IRRADIANCE_DIRECT },
         reuse: if has_probes && shares_hits(settings, models, kinds, &mixtures) { settings.reuse } else { 0 },
         ..Features::default()
     };
@@ -286,10 +290,10 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         texels,
         textures,
         profiles,
-        thickness,
         balances,
         mixtures,
         clusters,
+        cache,
         advice,
         camera,
         rows: y0.saturating_sub(margin)..(y1 + margin).min(height),

@@ -46,6 +46,63 @@ impl fmt::Display for Reproject {
     }
 }
 
+/// How the light is found that enters at a sampled point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Irradiance {
+    /// By shadow rays of each sample.
+    #[default]
+    Direct = shared::IRRADIANCE_DIRECT,
+    /// Between points of the surface that are lit once, before the first sample ([`cache`](mod@crate::cache)): a look-up takes the
+    /// place of shadow rays, however many [`Settings::directions`] there are. Its error is that of linear interpolation
+    /// between points, which moves the edge of a shadow by up to half their distance; and the noise left in the points'
+    /// light, which no number of samples of the image reduces and its variance does not hold.
+    ///
+    /// Of [`Integrator::Sample`] alone; not for the directional dipole, whose value depends on where light comes from, nor
+    /// for recordings. Matter in the opaque limit, which spreads no light, and light that enters on the inner side of
+    /// surfaces stay as they are with [`Irradiance::Direct`].
+    Cached = shared::IRRADIANCE_CACHED,
+}
+
+impl Irradiance {
+    /// Every choice, with its name on the command line.
+    pub const NAMES: [(Irradiance, &str); 2] = [(Irradiance::Direct, "direct"), (Irradiance::Cached, "cached")];
+}
+
+impl fmt::Display for Irradiance {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (_, name) = Irradiance::NAMES.iter().find(|(it, _)| it == self).expect("every choice has a name");
+        out.pad(name)
+    }
+}
+
+/// How fine [`Irradiance::Cached`] is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cache {
+    /// Most points, 0 to [`Cache::POINTS_MAX`], besides those at the vertices, which there always are.
+    pub points: u32,
+    /// Samples that light each point, of [`Settings::directions`] directions and points of emitters each; at least 2, so
+    /// that differences can be told from noise. Delta lights need none.
+    pub samples: u32,
+    /// Distance between points that is fine enough, in mean free paths; positive. Where light hardly varies they are four
+    /// times as far apart.
+    pub spacing: f64,
+    /// Points are added to a triangle whose light differs between neighbouring ones by more than this share of the light's
+    /// root mean square over all vertices; not negative. 0 makes all as fine as they get.
+    pub tolerance: f64,
+}
+
+impl Cache {
+    /// As many as every device's binding holds.
+    pub const POINTS_MAX: u32 = 1 << 19;
+}
+
+impl Default for Cache {
+    fn default() -> Self {
+        Cache { points: 1 << 17, samples: 32, spacing: 0.5, tolerance: 0.1 }
+    }
+}
+
 /// What computes the light that comes out of matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
@@ -272,6 +329,9 @@ pub struct Settings {
     pub cloud: Cloud,
     pub projection: Projection,
     pub reproject: Reproject,
+    pub irradiance: Irradiance,
+    /// Of [`Irradiance::Cached`] alone.
+    pub cache: Cache,
     pub normalisation: Normalisation,
     /// Profile of every translucent material; `Auto` leaves it to each.
     pub model: Model,
@@ -328,6 +388,8 @@ impl Default for Settings {
             cloud: Cloud::default(),
             projection: Projection::Mis,
             reproject: Reproject::Trace,
+            irradiance: Irradiance::Direct,
+            cache: Cache::default(),
             normalisation: Normalisation::Energy,
             model: Model::Auto,
             directional: None,

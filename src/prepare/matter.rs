@@ -1,7 +1,8 @@
 //! Materials as kernels read them, with all that their matter brings: profiles, rough boundaries, curvatures, mixtures.
 
-use super::{Before, Prepared, cloud, sets};
+use super::{Before, Prepared, cloud, kept, sets};
 use crate::{
+    cache::Cache,
     error::{Error, Result},
     model::{self, Advice, Choice},
     reference::{
@@ -24,10 +25,10 @@ pub(super) struct Matter {
     pub boundaries: Vec<f32>,
     /// [`Features::rough`](shared::Features::rough).
     pub rough_rows: u32,
-    pub thickness: Vec<Vec3>,
     pub balances: Vec<Balance>,
     pub mixtures: Vec<Mixture>,
     pub clusters: Vec<Cluster>,
+    pub cache: Cache,
 }
 
 impl Matter {
@@ -41,9 +42,10 @@ impl Matter {
             Integrator::Cloud => cloud::clusters(scene, settings, &mut materials, &profiles, &thickness)?,
             _ => vec![],
         };
+        let cache = kept::points(scene, settings, &materials)?;
         let rough_rows = boundaries.feature();
         let boundaries = boundaries.values;
-        Ok(Matter { materials, profiles, boundaries, rough_rows, thickness, balances, mixtures, clusters })
+        Ok(Matter { materials, profiles, boundaries, rough_rows, balances, mixtures, clusters, cache })
     }
 
     /// The same as before.
@@ -53,10 +55,10 @@ impl Matter {
             profiles: prepared.profiles.clone(),
             boundaries: prepared.boundaries.clone(),
             rough_rows: prepared.features.rough,
-            thickness: prepared.thickness.clone(),
             balances: prepared.balances.clone(),
             mixtures: prepared.mixtures.clone(),
             clusters: prepared.clusters.clone(),
+            cache: prepared.cache.clone(),
         }
     }
 }

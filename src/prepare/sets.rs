@@ -85,8 +85,10 @@ pub(super) fn balances(
         return vec![];
     }
     let count = scene.triangles.len();
+    let even: Vec<Balance> =
+        thickness.iter().map(|&curvature| Balance { at: [Vec3::ONE; 3], curvature }).collect();
     let mut places: Vec<Option<usize>> = vec![None; scene.materials.len()];
-    let mut all = vec![Balance { at: [Vec3::ONE; 3] }; count];
+    let mut all = even.clone();
     for index in 0..scene.materials.len() {
         if materials[index].model != MODEL_TABLE {
             continue;
@@ -96,7 +98,9 @@ pub(super) fn balances(
         let place = (0..).find(|place| !taken.contains(place)).expect("a number that is free");
         places[index] = Some(place);
         materials[index].balance = (place * count) as u32;
-        all.resize(all.len().max((place + 1) * count), Balance { at: [Vec3::ONE; 3] });
+        if all.len() == place * count {
+            all.extend_from_slice(&even);
+        }
         let Some(medium) = &scene.materials[index].medium else { continue };
         let length = diffuse_mean_free_path(medium) * scene.frame.scale;
         let material = &materials[index];

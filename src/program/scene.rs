@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
-    settings::{Cloud, Directional, Integrator, Reproject},
+    settings::{Cache, Cloud, Directional, Integrator, Irradiance, Reproject},
     timeline::Timeline,
 };
 
@@ -38,6 +38,10 @@ pub struct Method {
     /// the camera sees).
     #[arg(long, default_value = "trace", value_parser = reprojects())]
     reproject: Reproject,
+    /// Light at the sampled point: traced for each sample, or looked up between points of the surface that are lit once
+    /// (cached).
+    #[arg(long, default_value = "direct", value_parser = irradiances())]
+    irradiance: Irradiance,
     /// Width in pixels of the tiles that share the hits they light, which divides noise among them; 1 shares none.
     #[arg(long, value_name = "1|2|4|8", default_value = "8", value_parser = reuses())]
     reuse: u32,
@@ -69,6 +73,19 @@ pub struct Subject {
     /// Samples that light each point of the cloud.
     #[arg(long, value_name = "M", default_value_t = Cloud::default().samples, value_parser = clap::value_parser!(u32).range(1..))]
     cloud_samples: u32,
+    /// Most points that keep light (--irradiance cached), besides those at vertices.
+    #[arg(long, value_name = "N", default_value_t = Cache::default().points,
+          value_parser = clap::value_parser!(u32).range(0..=Cache::POINTS_MAX as i64))]
+    cache_points: u32,
+    /// Samples that light each of them.
+    #[arg(long, value_name = "M", default_value_t = Cache::default().samples, value_parser = clap::value_parser!(u32).range(2..))]
+    cache_samples: u32,
+    /// Distance between them that is fine enough, in mean free paths.
+    #[arg(long, value_name = "X", default_value_t = Cache::default().spacing, value_parser = arguments::not_negative)]
+    cache_spacing: f64,
+    /// Share of the light by which neighbouring points may differ before there are more between them.
+    #[arg(long, value_name = "X", default_value_t = Cache::default().tolerance, value_parser = arguments::not_negative)]
+    cache_tolerance: f64,
     /// Whether all light that enters and is not absorbed leaves again, or the darker constant of Jensen et al. 2001.
     #[arg(long, default_value = "energy", value_parser = normalisations())]
     normalisation: Normalisation,
@@ -140,6 +157,13 @@ fn reprojects() -> impl TypedValueParser<Value = Reproject> {
     })
 }
 
+fn irradiances() -> impl TypedValueParser<Value = Irradiance> {
+    PossibleValuesParser::new(Irradiance::NAMES.map(|(_, name)| name)).map(|text| {
+        let found = Irradiance::NAMES.into_iter().find(|(_, name)| *name == text);
+        found.expect("the parser passes names alone").0
+    })
+}
+
 fn reuses() -> impl TypedValueParser<Value = u32> {
     PossibleValuesParser::new(["1", "2", "4", "8"]).map(|width| width.parse().expect("the parser passes numbers alone"))
 }
@@ -192,8 +216,8 @@ impl SceneOptions {
 impl Method {
     /// `settings` with these options.
     pub fn settings(&self, settings: Settings) -> Settings {
-        let Method { directions, integrator, projection, reproject, reuse, model } = *self;
-        Settings { directions, integrator, projection, reproject, reuse, model, ..settings }
+        let Method { directions, integrator, projection, reproject, irradiance, reuse, model } = *self;
+        Settings { directions, integrator, projection, reproject, irradiance, reuse, model, ..settings }
     }
 }
 
@@ -245,6 +269,12 @@ impl Subject {
             camera: self.camera.clone().unwrap_or_default(),
             crop: self.crop,
             cloud: Cloud { points: self.cloud_points, opening: self.cloud_opening, samples: self.cloud_samples },
+            cache: Cache {
+                points: self.cache_points,
+                samples: self.cache_samples,
+                spacing: self.cache_spacing,
+                tolerance: self.cache_tolerance,
+            },
             normalisation: self.normalisation,
             directional: self.directional(),
             curvature: self.curvature,

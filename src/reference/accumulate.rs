@@ -30,9 +30,9 @@ use super::projection::{
 use super::rough::{crossing, leaving_share};
 use super::sums::Contribution;
 use super::tile::{Place, coordinate, direction_point};
-use super::{Inputs, emitter, intersect, mixture, texture};
+use super::{Inputs, cached, emitter, intersect, mixture, texture};
 use crate::shared::{
-    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE, MAX_HITS, MISS,
+    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE, IRRADIANCE_CACHED, MAX_HITS, MISS,
     MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
     TEXTURE_BASE_COLOR, Triangle,
 };
@@ -129,8 +129,21 @@ pub(super) fn carried(
         MODEL_DIRECTIONAL => directed(local, &seen, delta, entry.shading, wi, exponent),
         _ => profile::obliqueness(local, entry.shading.dot(wi), false),
     };
-    let place = Place::of(inputs, step, index);
-    Contribution::of(entry.tint * leaving * factor * entering_light(inputs, step, place, &entry, value))
+    let light = match keeps_light(inputs, matter, &seen) {
+        true => kept_light(inputs, step, local, &entry, triangle),
+        false => entering_light(inputs, step, Place::of(inputs, step, index), &entry, value),
+    };
+    Contribution::of(entry.tint * leaving * factor * light)
+}
+
+/// Whether light that enters on the seen side of a surface is kept; in the opaque limit it is not spread.
+pub(super) fn keeps_light(inputs: &Inputs, matter: Matter, seen: &Seen) -> bool {
+    inputs.features.irradiance == IRRADIANCE_CACHED && seen.side > 0.0 && matter.material.model != MODEL_LAMBERT
+}
+
+/// All light that enters, once in a sample.
+pub(super) fn kept_light(inputs: &Inputs, step: &Step, local: Matter, entry: &Entry, triangle: u32) -> DVec3 {
+    if step.ray_begin == 0 { cached::cached(inputs, local, triangle, entry.weights) } else { DVec3::ZERO }
 }
 
 /// What light that leaves is multiplied by: `matter` is that of the surface that is seen, `local` that which it entered.
@@ -248,7 +261,7 @@ pub(super) struct Entry<'a> {
     material: &'a Material,
     point: DVec3,
     /// Geometric normal on the camera's side of xo.
-    normal: DVec3,
+    pub normal: DVec3,
     /// Interpolated normal on that side.
     pub shading: DVec3,
     /// Base colour where the light crosses the surface.

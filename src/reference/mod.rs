@@ -8,6 +8,7 @@ pub mod accumulate;
 pub mod area;
 pub mod begin;
 pub mod boundary;
+pub mod cached;
 pub mod cluster;
 pub mod count;
 pub mod emitter;
@@ -39,7 +40,7 @@ pub mod uniform;
 pub mod walk;
 
 use crate::shared::{
-    BATCHES, Balance, Coordinates, Emitter, Features, Hits, Light, Material, Mixture, Pixel, Probe, Shading, Step,
+    BATCHES, Balance, Cluster, Coordinates, Emitter, Features, Hits, Lattice, Light, Material, Mixture, Pixel, Probe, Shading, Step,
     Sums, Surface, Texture, Triangle, View,
 };
 use glam::Vec3;
@@ -70,12 +71,13 @@ pub struct Inputs<'a> {
     pub coordinates: &'a [Coordinates],
     /// Tabulated profiles of the materials.
     pub profiles: &'a [f32],
-    /// Curvatures at the vertices of each triangle; empty where no profile depends on them.
-    pub thickness: &'a [Vec3],
-    /// Balances of profiles and triangles; as many as curvatures, or several times that.
+    /// Balances of profiles and triangles, one of each triangle or several; empty where no profile depends on curvatures.
     pub balances: &'a [Balance],
     /// Media of each set; empty where none holds several materials.
     pub mixtures: &'a [Mixture],
+    /// Points whose light is kept, and the lattice of each triangle; empty where none is. See [`cached`](mod@cached).
+    pub kept: &'a [Cluster],
+    pub lattices: &'a [Lattice],
     /// Finds triangles that a ray may meet, where there is one; else rays look at all of them.
     pub tree: Option<&'a walk::mesh::Mesh>,
 }

@@ -114,9 +114,10 @@ pub fn material<'a>(inputs: &Inputs<'a>, surface: &Surface) -> &'a Material {
 
 /// 1 over the radius of the sphere that the body resembles at the surface; 0 where that is not asked for.
 pub fn curvature(inputs: &Inputs, surface: &Surface) -> f64 {
-    let Some(curvatures) = inputs.thickness.get(surface.triangle as usize) else { return 0.0 };
+    let number = material(inputs, surface).balance + surface.triangle;
+    let Some(balance) = inputs.balances.get(number as usize) else { return 0.0 };
     let [b1, b2] = surface.barycentric.as_dvec2().to_array();
-    curvatures.as_dvec3().dot(DVec3::new(1.0 - b1 - b2, b1, b2))
+    balance.curvature.as_dvec3().dot(DVec3::new(1.0 - b1 - b2, b1, b2))
 }
 
 /// The factor on the profile of a material at the surface that is seen; 1 where profiles do not depend on the curvature.

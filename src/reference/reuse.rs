@@ -29,7 +29,7 @@
 //! [0, 1) evenly. The expectation is the same, with a quarter of the reads.
 
 use super::Inputs;
-use super::accumulate::{Entry, choose, entering_light, leaving};
+use super::accumulate::{Entry, choose, entering_light, keeps_light, kept_light, leaving};
 use super::pixel::position;
 use super::profile::obliqueness;
 use super::profile::{shapes, shapes_drawn};
@@ -92,7 +92,11 @@ pub fn light(inputs: &Inputs, step: &Step, index: u32, stage: &Stage, hits: &Hit
     let delta = probe.offset.as_dvec3() + f64::from(hits.t[chosen]) * probe.direction.as_dvec3();
     let entry = Entry::new(inputs, matter.material, seen.side, seen.position + delta, hits.triangle[chosen]);
     let value = |wi: DVec3| obliqueness(matter, entry.shading.dot(wi), false);
-    let light = entry.tint * entering_light(inputs, step, Place::of(inputs, step, index), &entry, value);
+    let light = match keeps_light(inputs, matter, &seen) {
+        true => kept_light(inputs, step, matter, &entry, hits.triangle[chosen]),
+        false => entering_light(inputs, step, Place::of(inputs, step, index), &entry, value),
+    };
+    let light = entry.tint * light;
     if light == DVec3::ZERO {
         return None;
     }

@@ -6,7 +6,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, download_to},
     image::{Attribute, Channel, Image},
-    settings::{Cloud, Integrator},
+    settings::{Cache, Cloud, Integrator, Irradiance},
     shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
     timeline::{self, Work},
 };
@@ -105,7 +105,7 @@ fn read<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot, count: usize) -> Resu
 }
 
 /// All elements of a slot.
-fn whole<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result<Vec<T>> {
+pub(super) fn whole<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result<Vec<T>> {
     let bytes = renderer.buffer(slot).map_or(0, Buffer::bytes) as usize;
     read(renderer, slot, bytes / size_of::<T>())
 }
@@ -233,6 +233,12 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
         }),
         "reuse": settings.reuse,
         "reproject": settings.reproject.to_string(),
+        "irradiance": settings.irradiance.to_string(),
+        // Points, samples, spacing and tolerance.
+        "cache": (settings.irradiance == Irradiance::Cached).then(|| {
+            let Cache { points, samples, spacing, tolerance } = settings.cache;
+            serde_json::json!([points, samples, spacing, tolerance])
+        }),
         "projection": format!("{:?}", settings.projection).to_lowercase(),
         "normalisation": format!("{:?}", settings.normalisation).to_lowercase(),
         "model": settings.model.to_string(),

@@ -82,7 +82,7 @@ fn remedy(slot: Slot) -> &'static str {
         Slot::Nodes | Slot::Triangles | Slot::Shadings | Slot::Coordinates => "use a mesh of fewer triangles",
         Slot::Texels | Slot::Textures => "use smaller textures",
         Slot::Environment | Slot::EnvironmentCdf => "use a smaller image as environment",
-        Slot::Profiles | Slot::Thickness | Slot::Balances => "take a model without tables (--model burley)",
+        Slot::Profiles | Slot::Balances => "take a model without tables (--model burley)",
         _ => "lower the resolution or crop",
     }
 }

@@ -4,9 +4,9 @@ mod adaptive;
 mod assemble;
 mod bands;
 mod budget;
-mod cloud;
 mod error;
 mod host;
+mod irradiance;
 mod plan;
 mod record;
 mod sums;
@@ -118,7 +118,7 @@ pub struct Renderer {
     strata: [Option<u32>; BATCHES as usize],
     /// First sample of the sums.
     begin: Option<u32>,
-    /// The cloud is lit, and by the lights that there are.
+    /// Points of the surface are lit, and by the lights that there are.
     lit: bool,
     /// Where the host computes light.
     host: Option<host::Host>,
@@ -391,7 +391,7 @@ impl Renderer {
         let mut state = Progress { done: 0, total, error: None };
         let early = |band: &Band| u64::from(band.pixels) * u64::from(band.end.min(range.end) - range.start);
         state.done += self.bands.iter().map(early).sum::<u64>();
-        self.light_cloud()?;
+        self.light_points()?;
         let mut stop = false;
         let mut pass = range.start..range.start + 1;
         while !pass.is_empty() {

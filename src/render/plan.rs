@@ -124,6 +124,7 @@ pub(super) fn needs(prepared: &Prepared, stem: &str) -> (bool, &'static str) {
         },
         "count" => (true, "counts the samples of each pixel"),
         "resolve" => (true, "makes means and variances of the sums"),
+        "irradiance" if !prepared.cache.points.is_empty() => (true, "light is kept at points of the surface"),
         "irradiance" | "cluster" | "gather" => match prepared.clusters.is_empty() {
             false => (true, "light is gathered from a cloud of points"),
             true => (false, "no light is gathered from a cloud of points"),
@@ -186,10 +187,11 @@ pub(super) fn prepared_data(prepared: &Prepared) -> Vec<(Slot, &[u8])> {
         (Slot::Texels, bytemuck::cast_slice(&prepared.texels)),
         (Slot::Textures, bytemuck::cast_slice(&prepared.textures)),
         (Slot::Profiles, bytemuck::cast_slice(&prepared.profiles)),
-        (Slot::Thickness, bytemuck::cast_slice(&prepared.thickness)),
         (Slot::Balances, bytemuck::cast_slice(&prepared.balances)),
         (Slot::Mixtures, bytemuck::cast_slice(&prepared.mixtures)),
         (Slot::Clusters, bytemuck::cast_slice(&prepared.clusters)),
+        (Slot::Clusters, bytemuck::cast_slice(&prepared.cache.points)),
+        (Slot::Lattices, bytemuck::cast_slice(&prepared.cache.lattices)),
     ]
     .into_iter()
     .filter(|(_, data)| !data.is_empty())
@@ -208,14 +210,15 @@ pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slo
     of_scene.chain(of_band).chain(counters).chain(recorded).collect()
 }
 
-/// Bytes that a buffer of a renderer that records may come to need when matter changes ([`Renderer::update`]): tables
-/// of any matter, 482 kB for each material (12 kB where profiles do not depend on curvatures), and a rough boundary of
-/// each translucent material's own.
+/// Bytes that a buffer may come to need: points that are added where light varies; and where a renderer records and
+/// matter changes ([`Renderer::update`]), tables of any matter, 482 kB for each material (12 kB where profiles do not depend
+/// on curvatures), and a rough boundary of each translucent material's own.
 ///
 /// [`Renderer::update`]: super::Renderer::update
 fn room(prepared: &Prepared, slot: Slot) -> u64 {
     let choices = || prepared.advice.iter().flatten().map(|advice| &advice.choice);
     let each = match slot {
+        Slot::Clusters => prepared.cache.room,
         _ if prepared.features.recorded == 0 => 0,
         Slot::Profiles => {
             let tables = choices().filter(|choice| choice.model == Model::Table).count();
@@ -236,12 +239,13 @@ fn absent(slot: Slot) -> String {
         Slot::Emitters => "no triangle emits light",
         Slot::Texels | Slot::Textures | Slot::Coordinates => "no texture",
         Slot::Profiles => "no material has the table model",
-        Slot::Thickness | Slot::Balances => "no profile depends on the curvature",
+        Slot::Balances => "no profile depends on the curvature",
         Slot::Mixtures => "no set holds several materials",
         Slot::Probes | Slot::HitLists => {
             "no surface is translucent, all are in the opaque limit, or light is gathered or computed on the host"
         }
-        Slot::Clusters => "no light is gathered from a cloud",
+        Slot::Clusters => "no light is gathered from a cloud, or kept",
+        Slot::Lattices => "no light is kept at points of the surface",
         Slot::Gathers => "one dispatch gathers all light, or none is gathered",
         Slot::BatchSums => "no variance is asked for",
         Slot::Progresses | Slot::Samples | Slot::Colors => "nothing is recorded into a caller's command buffer",

@@ -85,6 +85,10 @@ constants! {
     REPROJECT_TRACE: u32 = 0;
     /// Reproject: points are looked up in the G-buffer.
     REPROJECT_SCREEN: u32 = 1;
+    /// Irradiance: shadow rays from each hit.
+    IRRADIANCE_DIRECT: u32 = 0;
+    /// Irradiance: interpolated between points of the surface, which are lit once.
+    IRRADIANCE_CACHED: u32 = 1;
     /// Looking up: pixels' widths between a hit in the plane of the triangle that a pixel sees and the point of it that the
     /// pixel sees, at most.
     SCREEN_REACH: f32 = 4.0;
@@ -369,7 +373,8 @@ structs! {
         range_begin: u32,
         /// End of those that light the cloud.
         range_end: u32,
-        /// Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from.
+        /// Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from. The first of the
+    /// points that `irradiance` lights.
         node: u32,
         /// The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
         point: [u32; 5],
@@ -489,13 +494,15 @@ structs! {
         exit: Vec3,
     }
 
-    /// Factor on a material's tabulated profile at a triangle, with which it gives back what its sphere does.
+    /// What a material's tabulated profile needs of a triangle, at the three vertices.
     struct Balance {
-        /// At the three vertices.
+        /// Factors with which the profile gives back what its sphere does.
         at: [Vec3; 3],
+        /// 1 over the radius of the sphere that the body resembles there.
+        curvature: Vec3,
     }
 
-    /// A point of the cloud (a leaf), or what the points below a node of its tree have in common.
+    /// A point whose light is kept, as of the cloud (a leaf), or what the points below a node of its tree have in common.
     struct Cluster {
         /// Of several points, the mean by flux.
         position: Vec3,
@@ -518,6 +525,16 @@ structs! {
         /// Of a leaf: its triangle, and the weights of the second and third vertex.
         triangle: u32,
         barycentric: Vec2,
+    }
+
+    /// Points of a triangle whose light is kept: b1 = i / cells, b2 = j / cells with whole numbers i + j <= cells.
+    struct Lattice {
+        /// Cells along each edge; 0 for a triangle that lets no light in, or is in the opaque limit.
+        cells: u32,
+        /// The points at its three vertices, which triangles around a vertex share.
+        corners: [u32; 3],
+        /// The first of its others: by rising j, then i.
+        first: u32,
     }
 
     /// What a pixel has gathered so far.
@@ -719,8 +736,8 @@ buffers! {
     Coordinates = 19: COORDINATES [Coordinates] coordinates;
     /// Tabulated profiles of the materials that have them; see `table::block`.
     Profiles = 20: PROFILES [f32] profiles;
-    /// At the vertices of each triangle, 1 over the radius of the sphere that the body resembles there.
-    Thickness = 21: THICKNESS [Vec3] thickness;
+    /// Where the light of each triangle is kept.
+    Lattices = 21: LATTICES [Lattice] lattices;
     /// Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
     Boundaries = 22: BOUNDARIES [f32] boundaries;
     /// One Progress.
@@ -733,7 +750,8 @@ buffers! {
     Mixtures = 26: MIXTURES [Mixture] mixtures;
     /// Balances of each triangle, once for as many materials as its set has.
     Balances = 27: BALANCES [Balance] balances;
-    /// The cloud's tree: node i has the children 2 i and 2 i + 1, the leaves are the second half; node 0 is none.
+    /// The cloud's tree: node i has the children 2 i and 2 i + 1, the leaves are the second half; node 0 is none. Or the
+    /// points of Lattices.
     Clusters = 28: CLUSTERS [Cluster] clusters;
     /// One per pixel of the band, where a cloud is gathered by several dispatches.
     Gathers = 29: GATHERS [Gather] gathers;
@@ -770,6 +788,8 @@ features! {
     reuse = 13: REUSE,
     /// One of REPROJECT_*.
     reproject = 14: REPROJECT,
+    /// One of IRRADIANCE_*.
+    irradiance = 15: IRRADIANCE,
 }
 
 impl Features {

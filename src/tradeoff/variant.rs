@@ -1,6 +1,6 @@
 //! The ways in which a scene is rendered.
 
-use crate::settings::{Integrator, Model, Projection, Reproject, Settings};
+use crate::settings::{Integrator, Irradiance, Model, Projection, Reproject, Settings};
 
 /// A value of an axis by its name on the command line, and what it changes in the settings.
 pub type Choice = (&'static str, fn(&mut Settings));
@@ -12,7 +12,10 @@ pub const REPROJECT: &[Choice] = &[
 ];
 
 /// How light at the sampled point is found, the default first.
-pub const IRRADIANCE: &[Choice] = &[("direct", |_| {})];
+pub const IRRADIANCE: &[Choice] = &[
+    ("direct", |settings| settings.irradiance = Irradiance::Direct),
+    ("cached", |settings| settings.irradiance = Irradiance::Cached),
+];
 
 /// What is varied; every combination is a [`Variant`].
 #[derive(Clone, Debug)]

@@ -30,6 +30,7 @@ const EVERYTHING: Features = Features {
     mixtures: 0,
     reuse: 0,
     reproject: REPROJECT_TRACE,
+    irradiance: IRRADIANCE_DIRECT,
     integrator: INTEGRATOR_SAMPLE,
 };
 
@@ -99,7 +100,7 @@ impl Bench {
     /// # Errors
     /// [`Error::Vulkan`], [`Error::Memory`].
     pub fn load(&self, inputs: &Inputs, nodes: &[UVec4], buffers: &[(Slot, &[u8])]) -> Result<Loaded> {
-        let fixed: [(Slot, &[u8]); 18] = [
+        let fixed: [(Slot, &[u8]); 19] = [
             (Slot::Views, bytemuck::bytes_of(inputs.view)),
             (Slot::Nodes, bytemuck::cast_slice(nodes)),
             (Slot::Triangles, bytemuck::cast_slice(inputs.triangles)),
@@ -115,9 +116,10 @@ impl Bench {
             (Slot::Textures, bytemuck::cast_slice(inputs.textures)),
             (Slot::Coordinates, bytemuck::cast_slice(inputs.coordinates)),
             (Slot::Profiles, bytemuck::cast_slice(inputs.profiles)),
-            (Slot::Thickness, bytemuck::cast_slice(inputs.thickness)),
             (Slot::Balances, bytemuck::cast_slice(inputs.balances)),
             (Slot::Mixtures, bytemuck::cast_slice(inputs.mixtures)),
+            (Slot::Clusters, bytemuck::cast_slice(inputs.kept)),
+            (Slot::Lattices, bytemuck::cast_slice(inputs.lattices)),
         ];
         let given = fixed.into_iter().chain(buffers.iter().copied()).filter(|(_, data)| !data.is_empty());
         self.bind(inputs.features, given)

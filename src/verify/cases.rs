@@ -1,12 +1,13 @@
 //! Small scenes, made in the program, on which kernels are tested.
 
 use crate::{
+    cache::Geometry,
     error::Result,
     measure::scenes::{Eye, Mesh, gltf, matter, sun},
     prepare::{Prepared, prepare},
     reference::Inputs,
     scene::{Environment, EnvironmentMap, LoadOptions, Scene},
-    settings::{Cloud, Directional, Integrator, Model, Projection, Reproject, Settings, SingleScattering},
+    settings::{Cloud, Directional, Integrator, Irradiance, Model, Projection, Reproject, Settings, SingleScattering},
 };
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -143,6 +144,10 @@ pub fn cases() -> Result<Vec<Case>> {
     cases.push(mixed()?);
     cases.extend(tiled()?);
     cases.extend(looked_up()?);
+    for mut case in kept()? {
+        case.prepared.cache.points = super::cloud::lit(&case);
+        cases.push(case);
+    }
     Ok(cases)
 }
 
@@ -214,6 +219,32 @@ fn looked_up() -> Result<Vec<Case>> {
         let scene = still_life(&materials, light)?;
         let reproject = Reproject::Screen;
         cases.push(Case::new(name, scene, &Settings { model, projection, reproject, reuse, ..settings(seed) })?);
+    }
+    Ok(cases)
+}
+
+/// Scenes in which light is kept at points of the surface, on lattices of one to four cells.
+///
+/// # Errors
+/// As [`cases`].
+pub(super) fn kept() -> Result<Vec<Case>> {
+    let list = [
+        ("table, kept light, delta lights", Model::Table, Light::Delta, 1),
+        ("burley, kept light, tiles of 4, emitters", Model::Burley, Light::Emitters, 4),
+    ];
+    let mut cases = vec![];
+    for (seed, (name, model, light, reuse)) in (37..).zip(list) {
+        let mut materials = materials();
+        materials[0]["extras"]["bssrdf"]["ior"] = json!(1.3);
+        let scene = still_life(&materials, light)?;
+        let irradiance = Irradiance::Cached;
+        let mut case = Case::new(name, scene, &Settings { model, irradiance, reuse, ..settings(seed) })?;
+        let (cache, geometry) = (&mut case.prepared.cache, Geometry::of(&case.scene));
+        let of_ball = |index: &usize| case.scene.shadings[*index].material == 0;
+        let ball: Vec<usize> = (0..geometry.triangles.len()).filter(of_ball).collect();
+        cache.refine(geometry, &ball[..2 * ball.len() / 3]);
+        cache.refine(geometry, &ball[..ball.len() / 3]);
+        cases.push(case);
     }
     Ok(cases)
 }

@@ -1,8 +1,9 @@
-//! The kernels of the cloud: light at its points, its tree, and what pixels gather.
+//! Light at points of the surface, the cloud's tree above them, and what pixels gather.
 
 use super::{Bound, Context, Roundings, Verdict, cases, roundings};
 use crate::{
     error::Result,
+    prepare::Prepared,
     reference::{
         self, cluster::grow, gather as twin, irradiance::irradiance as twin_irradiance,
         primary::primary as twin_primary,
@@ -18,15 +19,17 @@ const SHADING: Roundings = roundings(100, 6, 4);
 /// Part of the points and pixels in which rounding may decide whether a ray passes an edge.
 const CHOICES: f64 = 1e-3;
 
-/// A case's clusters with the twin's light at the leaves and none above.
-fn lit(case: &cases::Case) -> Vec<Cluster> {
+/// Samples that light points.
+const SAMPLES: u32 = 2;
+
+/// A case's clusters with the twin's light at the leaves and none above; or its points whose light is kept, with that.
+pub(super) fn lit(case: &cases::Case) -> Vec<Cluster> {
     let inputs = case.inputs();
-    let mut clusters = case.prepared.clusters.clone();
-    let (leaves, samples) = (clusters.len() / 2, 0..2);
-    clusters[leaves..].par_iter_mut().enumerate().filter(|(_, point)| point.area > 0.0).for_each(|(i, point)| {
-        for sample in samples.clone() {
-            let [flux, oblique] =
-                twin_irradiance(&inputs, &step(&inputs, sample, samples.len() as u32), i as u32, point);
+    let mut clusters = points(case).to_vec();
+    let first = inputs.view.leaves as usize;
+    clusters[first..].par_iter_mut().enumerate().filter(|(_, point)| point.area > 0.0).for_each(|(i, point)| {
+        for sample in 0..SAMPLES {
+            let [flux, oblique] = twin_irradiance(&inputs, &step(case, sample), i as u32, point);
             point.flux += flux.as_vec3();
             point.oblique += oblique.as_vec3();
         }
@@ -34,12 +37,20 @@ fn lit(case: &cases::Case) -> Vec<Cluster> {
     clusters
 }
 
+/// What Clusters holds.
+fn points(case: &cases::Case) -> &[Cluster] {
+    let Prepared { clusters, cache, .. } = &case.prepared;
+    if clusters.is_empty() { &cache.points } else { clusters }
+}
+
 /// All rays in the first sample, those that are drawn in the others.
-fn step(inputs: &reference::Inputs, sample_index: u32, samples: u32) -> Step {
+fn step(case: &cases::Case, sample_index: u32) -> Step {
+    let inputs = case.inputs();
     let ray_begin = if sample_index == 0 { 0 } else { inputs.view.light_count };
     let ray_count = inputs.features.rays(inputs.view) - ray_begin;
-    let pixel_count = inputs.view.leaves;
-    Step { sample_index, ray_begin, ray_count, pixel_count, range_end: samples, ..Step::default() }
+    let node = inputs.view.leaves;
+    let pixel_count = points(case).len() as u32 - node;
+    Step { sample_index, ray_begin, ray_count, pixel_count, node, range_end: SAMPLES, ..Step::default() }
 }
 
 /// Light that enters at points.
@@ -49,13 +60,13 @@ fn step(inputs: &reference::Inputs, sample_index: u32, samples: u32) -> Step {
 pub fn irradiance(context: &mut Context) -> Result<Verdict> {
     let mut verdict = Verdict::new(Bound::Relative(SHADING));
     verdict.exempt = CHOICES;
-    for case in cases::clouds()? {
-        let inputs = case.inputs();
+    for case in cases::clouds()?.into_iter().chain(cases::kept()?) {
+        let inputs = reference::Inputs { kept: &[], ..case.inputs() };
         let expected = lit(&case);
-        let mut found = case.prepared.clusters.clone();
-        for sample in 0..2 {
+        let mut found = points(&case).to_vec();
+        for sample in 0..SAMPLES {
             let buffers: [(Slot, &[u8]); 1] = [(Slot::Clusters, bytemuck::cast_slice(&found))];
-            let step = step(&inputs, sample, 2);
+            let step = step(&case, sample);
             let loaded = context.bench.run("irradiance", &inputs, &case.scene.nodes, &step, &buffers)?;
             found = context.bench.read(&loaded, Slot::Clusters)?;
         }
@@ -63,7 +74,7 @@ pub fn irradiance(context: &mut Context) -> Result<Verdict> {
         for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
             let at = |what: &str| format!("{}, {what} of cluster {i}", case.name);
             let kept = Cluster { flux: Vec3::ZERO, oblique: Vec3::ZERO, ..*found };
-            verdict.require(kept == case.prepared.clusters[i], || at("place"));
+            verdict.require(kept == points(&case)[i], || at("place"));
             let size = expected.flux.as_dvec3().length();
             bright += usize::from(size > 0.0);
             verdict.vector(found.flux, expected.flux.as_dvec3(), size, || at("flux"));

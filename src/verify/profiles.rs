@@ -60,7 +60,8 @@ fn world(model: u32, count: u32) -> World {
     if model == MODEL_TABLE {
         // The curvature at each invocation: half-spaces, and spheres of many sizes.
         let of = |i: u32| if i.is_multiple_of(4) { 0.0 } else { magnitude(i, 30, 1e-2, 10.0) as f32 };
-        world.thickness = (0..count).map(|i| Vec3::splat(of(i))).collect();
+        let at = |i: u32| Balance { at: [Vec3::ONE; 3], curvature: Vec3::splat(of(i)) };
+        world.balances = (0..count).map(at).collect();
     }
     world
 }
@@ -68,7 +69,7 @@ fn world(model: u32, count: u32) -> World {
 impl World {
     fn matter(&self, i: usize) -> Matter<'_> {
         let material = &self.materials[self.shadings[i].material as usize];
-        let curvature = self.thickness.get(i).map_or(0.0, |at| f64::from(at.x));
+        let curvature = self.balances.get(i).map_or(0.0, |balance| f64::from(balance.curvature.x));
         Matter { material, tables: &self.profiles, curvature }
     }
 }

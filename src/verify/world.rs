@@ -20,7 +20,6 @@ pub struct World {
     pub textures: Vec<Texture>,
     pub coordinates: Vec<Coordinates>,
     pub profiles: Vec<f32>,
-    pub thickness: Vec<Vec3>,
     pub balances: Vec<Balance>,
     pub mixtures: Vec<Mixture>,
 }
@@ -66,9 +65,10 @@ impl World {
             textures: &self.textures,
             coordinates: &self.coordinates,
             profiles: &self.profiles,
-            thickness: &self.thickness,
             balances: &self.balances,
             mixtures: &self.mixtures,
+            kept: &[],
+            lattices: &[],
             tree: None,
         }
     }

@@ -3,6 +3,7 @@
 
 mod adaptive;
 mod bad_meshes;
+mod cached;
 mod closed_forms;
 mod cloud;
 mod edge_cases;
