@@ -9,7 +9,7 @@ use std::{collections::HashMap, error::Error, f64::consts::PI, time::Instant};
 use translucent::{
     Device, DeviceOptions, Image, Renderer, Scene, Settings,
     scene::{Camera, Lens, Light, LightKind, Material, Medium, Mesh},
-    settings::Integrator,
+    settings::{Integrator, Irradiance},
 };
 
 const NAMES: [&str; 6] = ["slab", "ball", "ball in the sun", "dense Spot", "Spot", "thin Spot"];
@@ -242,25 +242,25 @@ fn main() -> Outcome<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let converged: u32 = arguments.first().map_or(Ok(128), |text| text.parse())?;
     let file = std::env::temp_dir().join(format!("equal_error.{}.exr", std::process::id()));
-    println!(
-        "{:<16} {:<10} {:>9} {:>8} {:>8} {:>9}",
-        "SCENE", "INTEGRATOR", "TRIANGLES", "SAMPLES", "TIME [s]", "relMSE"
-    );
+    println!("{:<16} {:<10} {:>9} {:>8} {:>8} {:>9}", "SCENE", "METHOD", "TRIANGLES", "SAMPLES", "TIME [s]", "relMSE");
     for name in NAMES.into_iter().filter(|name| arguments.get(1).is_none_or(|wanted| wanted == name)) {
         let settings = Settings { resolution: Some((512, 512)), ..Settings::default() };
         let subject = subject(name)?;
         let reference = render(&subject.scene()?, &Settings { seed: 1000, ..settings.clone() }, converged)?;
-        for integrator in [Integrator::Sample, Integrator::Cloud] {
+        let sample = settings.clone();
+        let cached = Settings { irradiance: Irradiance::Cached, ..settings.clone() };
+        let cloud = Settings { integrator: Integrator::Cloud, ..settings };
+        for (method, settings) in [("sample", sample), ("cached", cached), ("cloud", cloud)] {
             for samples in SAMPLES {
                 let start = Instant::now();
                 let scene = subject.scene()?;
-                let image = render(&scene, &Settings { integrator, ..settings.clone() }, samples)?;
+                let image = render(&scene, &settings, samples)?;
                 image.write(&file)?;
                 let time = start.elapsed().as_secs_f64();
                 let error = image.relative_mse(&reference)?.mean;
                 if error <= ENOUGH || samples == SAMPLES[SAMPLES.len() - 1] {
                     let triangles = scene.triangles.len();
-                    println!("{name:<16} {integrator:<10} {triangles:>9} {samples:>8} {time:>8.2} {error:>9.5}");
+                    println!("{name:<16} {method:<10} {triangles:>9} {samples:>8} {time:>8.2} {error:>9.5}");
                     break;
                 }
             }

@@ -11,23 +11,37 @@ uint lattice_number(Lattice lattice, uint i, uint j) {
     return lattice.first + (j * (2u * n + 3u - j)) / 2u + i - (j == 0u ? 1u : 2u);
 }
 
+// The cell of a triangle that is cut into n along each edge, and weights within it.
+bool lattice_cell(uint n, inout vec2 weights, out uint i, out uint j) {
+    vec2 inside = max(weights, vec2(0.0));
+    vec2 at = inside / max(inside.x + inside.y, 1.0) * float(n);
+    float x = min(floor(at.x), float(n) - 1.0);
+    float y = min(floor(at.y), float(n) - 1.0 - x);
+    vec2 rest = at - vec2(x, y);
+    i = uint(x);
+    j = uint(y);
+    bool upper = rest.x + rest.y > 1.0 && i + j + 1u < n;
+    weights = upper ? 1.0 - rest : rest;
+    return upper;
+}
+
 // E + slope O at a point of a triangle; `m` is what light enters there.
-vec3 cached_light(Material m, uint triangle, vec2 b) {
+vec3 cached_light(Material m, uint triangle, vec2 weights) {
     Lattice lattice = lattices[triangle];
+    uint i, j;
+    if (lattice.patches > 1u) {
+        uint n = lattice.patches;
+        uint upper = lattice_cell(n, weights, i, j) ? 1u : 0u;
+        lattice = lattices[lattice.first + j * (2u * n - j) + 2u * i + upper];
+    }
     if (lattice.cells == 0u) return vec3(0.0);
-    float n = float(lattice.cells);
-    b = max(b, vec2(0.0));
-    vec2 at = b / max(b.x + b.y, 1.0) * n;
-    vec2 cell = vec2(min(floor(at.x), n - 1.0), 0.0);
-    cell.y = min(floor(at.y), n - 1.0 - cell.x);
-    vec2 rest = at - cell;
-    uint i = uint(cell.x), j = uint(cell.y);
-    bool lower = rest.x + rest.y <= 1.0 || i + j + 1u == lattice.cells;
-    uint a = lattice_number(lattice, lower ? i : i + 1u, lower ? j : j + 1u);
+    bool upper = lattice_cell(lattice.cells, weights, i, j);
     uint right = lattice_number(lattice, i + 1u, j), above = lattice_number(lattice, i, j + 1u);
-    vec3 weights = lower ? vec3(1.0 - rest.x - rest.y, rest) : vec3(rest.x + rest.y - 1.0, 1.0 - rest.yx);
-    vec3 light = weights.x * clusters[a].flux + weights.y * clusters[right].flux + weights.z * clusters[above].flux;
+    uint a = upper ? lattice_number(lattice, i + 1u, j + 1u) : lattice_number(lattice, i, j);
+    uint b = upper ? above : right, c = upper ? right : above;
+    vec3 shares = vec3(1.0 - weights.x - weights.y, weights);
+    vec3 light = shares.x * clusters[a].flux + shares.y * clusters[b].flux + shares.z * clusters[c].flux;
     if (!has_model(m, MODEL_TABLE)) return light;
-    return light + table_slope(m) * (weights.x * clusters[a].oblique + weights.y * clusters[right].oblique
-        + weights.z * clusters[above].oblique);
+    return light + table_slope(m) * (shares.x * clusters[a].oblique + shares.y * clusters[b].oblique
+        + shares.z * clusters[c].oblique);
 }

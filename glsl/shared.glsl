@@ -535,13 +535,18 @@ struct Cluster {
     vec2 barycentric;
 };
 
-// Points of a triangle whose light is kept: b1 = i / cells, b2 = j / cells with whole numbers i + j <= cells.
+// Points of a triangle, or of one of the patches that it is cut into, whose light is kept: b1 = i / cells,
+// b2 = j / cells with whole numbers i + j <= cells.
 struct Lattice {
+    // Patches along each edge; 1 for a triangle that is not cut. Patches by rising j, then i, the lower one before
+    // the upper one: they follow in Lattices from `first` on, and there is nothing else here.
+    uint patches;
     // Cells along each edge; 0 for a triangle that lets no light in, or is in the opaque limit.
     uint cells;
-    // The points at its three vertices, which triangles around a vertex share.
+    // The points at its three vertices, which triangles around a vertex share. Of an upper patch the first is the one
+    // with the largest b1 and b2, then follows that with the largest b2.
     uint corners[3];
-    // The first of its others: by rising j, then i.
+    // The first of its other points: by rising j, then i.
     uint first;
 };
 
@@ -742,7 +747,7 @@ struct Pixel {
 #define COORDINATES(access) layout(set = 0, binding = 19, scalar) access buffer CoordinatesBlock { Coordinates coordinates[]; }
 // Tabulated profiles of the materials that have them; see `table::block`.
 #define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { float profiles[]; }
-// Where the light of each triangle is kept.
+// Where the light of each triangle is kept, then of patches of triangles.
 #define LATTICES(access) layout(set = 0, binding = 21, scalar) access buffer LatticesBlock { Lattice lattices[]; }
 // Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
 #define BOUNDARIES(access) layout(set = 0, binding = 22, scalar) access buffer BoundariesBlock { float boundaries[]; }

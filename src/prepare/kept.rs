@@ -43,7 +43,8 @@ pub(super) fn points(scene: &Scene, settings: &Settings, materials: &[Material])
             return refuse(format!("material `{}` {problem}", authored.name));
         }
         let spreads = authored.medium.as_ref().filter(|_| material.model != MODEL_LAMBERT);
-        let extinction = spreads.map(|medium| (medium.sigma_s_prime + medium.sigma_a).max_element() / scene.frame.scale);
+        let extinction =
+            spreads.map(|medium| (medium.sigma_s_prime + medium.sigma_a).max_element() / scene.frame.scale);
         spacings.push(extinction.filter(|&extinction| extinction > 0.0).map(|extinction| spacing / extinction));
     }
     let of_triangle = |index: usize| spacings[scene.shadings[index].material as usize];

@@ -85,8 +85,7 @@ pub(super) fn balances(
         return vec![];
     }
     let count = scene.triangles.len();
-    let even: Vec<Balance> =
-        thickness.iter().map(|&curvature| Balance { at: [Vec3::ONE; 3], curvature }).collect();
+    let even: Vec<Balance> = thickness.iter().map(|&curvature| Balance { at: [Vec3::ONE; 3], curvature }).collect();
     let mut places: Vec<Option<usize>> = vec![None; scene.materials.len()];
     let mut all = even.clone();
     for index in 0..scene.materials.len() {

@@ -32,9 +32,9 @@ use super::sums::Contribution;
 use super::tile::{Place, coordinate, direction_point};
 use super::{Inputs, cached, emitter, intersect, mixture, texture};
 use crate::shared::{
-    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE, IRRADIANCE_CACHED, MAX_HITS, MISS,
-    MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET, Step, Surface,
-    TEXTURE_BASE_COLOR, Triangle,
+    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE, IRRADIANCE_CACHED,
+    MAX_HITS, MISS, MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET,
+    Step, Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};

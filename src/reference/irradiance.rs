@@ -34,7 +34,8 @@ pub fn irradiance(inputs: &Inputs, step: &Step, index: u32, point: &Cluster) -> 
     let begin = step.ray_begin.max(lights);
     let other = Step { ray_begin: begin, ray_count: end.saturating_sub(begin), ..*step };
     let light = |value: &dyn Fn(DVec3) -> DVec3| {
-        let of = |step: &Step| entering_light(inputs, step, Place::alone((index, POINTS_ROW - step.first_row)), &entry, value);
+        let place = Place::first(inputs, (index, POINTS_ROW - step.first_row));
+        let of = |step: &Step| entering_light(inputs, step, place, &entry, value);
         f64::from(point.area) * tint * (of(&delta) + of(&other) / samples)
     };
     let oblique = |wi: DVec3| DVec3::splat(1.0 - cos_refracted(material.ior.into(), entry.shading.dot(wi)));

@@ -40,8 +40,8 @@ pub mod uniform;
 pub mod walk;
 
 use crate::shared::{
-    BATCHES, Balance, Cluster, Coordinates, Emitter, Features, Hits, Lattice, Light, Material, Mixture, Pixel, Probe, Shading, Step,
-    Sums, Surface, Texture, Triangle, View,
+    BATCHES, Balance, Cluster, Coordinates, Emitter, Features, Hits, Lattice, Light, Material, Mixture, Pixel, Probe,
+    Shading, Step, Sums, Surface, Texture, Triangle, View,
 };
 use glam::Vec3;
 use rayon::prelude::*;

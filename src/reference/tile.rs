@@ -34,6 +34,11 @@ impl Place {
         Place { tile, at: 0, width: 0 }
     }
 
+    /// The first place of a tile.
+    pub fn first(inputs: &Inputs, tile: (u32, u32)) -> Place {
+        Place { tile, at: 0, width: inputs.features.reuse }
+    }
+
     /// Of pixel `index` of the band.
     pub fn of(inputs: &Inputs, step: &Step, index: u32) -> Place {
         let width = inputs.features.reuse;

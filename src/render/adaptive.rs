@@ -21,7 +21,7 @@ use crate::{
     gpu::upload,
     image::FLOOR_OF_MEAN,
     settings::Integrator,
-    shared::{ACTIVE_HEADER, BATCHES, REPROJECT_SCREEN, Slot, Sums},
+    shared::{ACTIVE_HEADER, BATCHES, IRRADIANCE_CACHED, REPROJECT_SCREEN, Slot, Sums},
     timeline,
 };
 use glam::Vec3;
@@ -134,6 +134,9 @@ impl Renderer {
                 _ if !(error.is_finite() && error > 0.0) => format!("{error} is not a finite number above 0"),
                 _ if self.settings.integrator == Integrator::Cloud => {
                     "cannot be estimated where light is gathered from a cloud: all samples share it".into()
+                }
+                _ if self.prepared.features.irradiance == IRRADIANCE_CACHED => {
+                    "cannot be estimated where irradiance is cached: all samples share it".into()
                 }
                 _ if self.settings.integrator.is_on_host() => {
                     format!("is no goal of the integrator {}: it works on all pixels", self.settings.integrator)

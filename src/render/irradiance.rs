@@ -80,7 +80,8 @@ impl Renderer {
         // Delta lights have no noise; that of the rest is the difference of its halves.
         let mut flux = vec![];
         let halves = [0..samples / 2, samples / 2..samples];
-        for (rays, samples) in [(0..lights, 0..1), (lights..rays, halves[0].clone()), (lights..rays, halves[1].clone())] {
+        for (rays, samples) in [(0..lights, 0..1), (lights..rays, halves[0].clone()), (lights..rays, halves[1].clone())]
+        {
             self.trace_to_points(step, rays, samples, "cache")?;
             let mut points = vec![Cluster::default(); cache.points.len()];
             let buffer = self.buffer(Slot::Clusters).expect("light is kept");
@@ -99,7 +100,13 @@ impl Renderer {
 
     /// Adds the light of shadow rays of `samples` to the points of a step; delta lights, the first rays, are the same in
     /// every sample.
-    fn trace_to_points(&mut self, whole: Step, rays: Range<u32>, samples: Range<u32>, name: &'static str) -> Result<()> {
+    fn trace_to_points(
+        &mut self,
+        whole: Step,
+        rays: Range<u32>,
+        samples: Range<u32>,
+        name: &'static str,
+    ) -> Result<()> {
         let mut steps = vec![];
         for sample_index in samples {
             let begin = if sample_index == 0 { rays.start } else { rays.start.max(self.prepared.view.light_count) };

@@ -527,13 +527,18 @@ structs! {
         barycentric: Vec2,
     }
 
-    /// Points of a triangle whose light is kept: b1 = i / cells, b2 = j / cells with whole numbers i + j <= cells.
+    /// Points of a triangle, or of one of the patches that it is cut into, whose light is kept: b1 = i / cells,
+    /// b2 = j / cells with whole numbers i + j <= cells.
     struct Lattice {
+        /// Patches along each edge; 1 for a triangle that is not cut. Patches by rising j, then i, the lower one before
+        /// the upper one: they follow in Lattices from `first` on, and there is nothing else here.
+        patches: u32,
         /// Cells along each edge; 0 for a triangle that lets no light in, or is in the opaque limit.
         cells: u32,
-        /// The points at its three vertices, which triangles around a vertex share.
+        /// The points at its three vertices, which triangles around a vertex share. Of an upper patch the first is the one
+        /// with the largest b1 and b2, then follows that with the largest b2.
         corners: [u32; 3],
-        /// The first of its others: by rising j, then i.
+        /// The first of its other points: by rising j, then i.
         first: u32,
     }
 
@@ -736,7 +741,7 @@ buffers! {
     Coordinates = 19: COORDINATES [Coordinates] coordinates;
     /// Tabulated profiles of the materials that have them; see `table::block`.
     Profiles = 20: PROFILES [f32] profiles;
-    /// Where the light of each triangle is kept.
+    /// Where the light of each triangle is kept, then of patches of triangles.
     Lattices = 21: LATTICES [Lattice] lattices;
     /// Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
     Boundaries = 22: BOUNDARIES [f32] boundaries;

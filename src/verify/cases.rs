@@ -1,7 +1,7 @@
 //! Small scenes, made in the program, on which kernels are tested.
 
 use crate::{
-    cache::Geometry,
+    cache::{Cache, Geometry},
     error::Result,
     measure::scenes::{Eye, Mesh, gltf, matter, sun},
     prepare::{Prepared, prepare},
@@ -223,7 +223,7 @@ fn looked_up() -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// Scenes in which light is kept at points of the surface, on lattices of one to four cells.
+/// Scenes in which light is kept at points of the surface, on lattices of one to four cells, some of them patches.
 ///
 /// # Errors
 /// As [`cases`].
@@ -240,10 +240,15 @@ pub(super) fn kept() -> Result<Vec<Case>> {
         let irradiance = Irradiance::Cached;
         let mut case = Case::new(name, scene, &Settings { model, irradiance, reuse, ..settings(seed) })?;
         let (cache, geometry) = (&mut case.prepared.cache, Geometry::of(&case.scene));
-        let of_ball = |index: &usize| case.scene.shadings[*index].material == 0;
-        let ball: Vec<usize> = (0..geometry.triangles.len()).filter(of_ball).collect();
-        cache.refine(geometry, &ball[..2 * ball.len() / 3]);
-        cache.refine(geometry, &ball[..ball.len() / 3]);
+        // Some triangles are cut, as if they were larger.
+        let spacing = |triangle: usize| {
+            let of_ball = case.scene.shadings[triangle].material == 0;
+            of_ball.then_some(if triangle % 40 == 0 { 0.008 } else { 0.1 })
+        };
+        *cache = Cache::new(geometry, spacing, 100_000);
+        let all: Vec<usize> = (0..cache.patches.len()).collect();
+        cache.refine(geometry, &all[..2 * all.len() / 3]);
+        cache.refine(geometry, &all[..all.len() / 3]);
         cases.push(case);
     }
     Ok(cases)

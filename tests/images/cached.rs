@@ -172,7 +172,11 @@ fn points_go_where_light_varies() {
     let corners = cache.points.len();
     // A smooth sphere shares its vertices, but where its coordinates begin again.
     assert!(cache.lattices.iter().all(|lattice| lattice.cells == 1), "triangles are smaller than two mean free paths");
-    assert!(corners * 4 < cache.lattices.len() * 3, "{corners} points of {} triangles", cache.lattices.len());
+    assert!(
+        cache.patches.len() == scene.triangles.len() && corners * 4 < cache.lattices.len() * 3,
+        "{corners} points of {} triangles",
+        cache.lattices.len()
+    );
     // Light on one side, with an edge across the middle.
     for point in &mut cache.points {
         let lit = point.position.y > 0.0;
@@ -181,13 +185,14 @@ fn points_go_where_light_varies() {
     let coarse = cache.coarse(0.1, usize::MAX);
     // The other ball's triangles are smaller than half a mean free path.
     let cut = |index: usize| {
-        if scene.shadings[index].material == 0 {
+        let triangle = cache.patches[index].triangle;
+        if scene.shadings[triangle].material == 0 {
             return false;
         }
-        let above = scene.triangles[index].vertices.iter().filter(|vertex| vertex.y > 0.0).count();
+        let above = scene.triangles[triangle].vertices.iter().filter(|vertex| vertex.y > 0.0).count();
         (1..3).contains(&above)
     };
-    let fine: Vec<usize> = (0..scene.triangles.len()).filter(|&index| cut(index)).collect();
+    let fine: Vec<usize> = (0..cache.patches.len()).filter(|&index| cut(index)).collect();
     let mut found = coarse.clone();
     found.sort_unstable();
     assert_eq!(found, fine, "those that the edge cuts");

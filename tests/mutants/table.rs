@@ -132,7 +132,13 @@ mutants! {
     "reflect.comp", "lost factor", "kernel.reflect": "mix(vec3(f0 * f0)," => "mix(vec3(f0),";
     "reflect.comp", "lost factor", "kernel.reflect": "(c * c * c * c * c)" => "(c * c * c * c)";
     "irradiance.comp", "lost factor", "kernel.irradiance": "light *= crossing(m, c, share);" => "";
-    "irradiance.comp", "index", "kernel.irradiance": "uvec2(index, POINTS_ROW)" => "uvec2(index + 1u, POINTS_ROW)";
+    "irradiance.comp", "index", "kernel.irradiance": "uvec2(index, POINTS_ROW" => "uvec2(index + 1u, POINTS_ROW";
+    "irradiance.comp", "lost condition", "kernel.irradiance": "if (point.area == 0.0) return;" => "";
+    "cached.glsl", "index", "kernel.accumulate": "(j == 0u ? 1u : 2u)" => "1u";
+    "cached.glsl", "swapped branch", "kernel.accumulate": "uint b = upper ? above : right" => "uint b = upper ? right : above";
+    "cached.glsl", "index", "kernel.accumulate": "j * (2u * n - j) + 2u * i" => "j * (2u * n - j - 1u) + 2u * i";
+    "cached.glsl", "lost term", "kernel.accumulate": "return light + table_slope(m) *" => "return light + 0.0 * table_slope(m) *";
+    "accumulate.comp", "swapped branch", "kernel.accumulate": "entering = cached ? cached_light" => "entering = !cached ? cached_light";
     "cluster.comp", "sign", "kernel.cluster": "c.flux = a.flux + b.flux" => "c.flux = a.flux - b.flux";
     "cluster.comp", "index", "kernel.cluster": "b = clusters[2u * node + 1u]" => "b = clusters[2u * node]";
     "gather.comp", "index", "kernel.gather": "findLSB(j + 1u)" => "findLSB(j)";
