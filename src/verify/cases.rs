@@ -243,12 +243,13 @@ pub(super) fn kept() -> Result<Vec<Case>> {
         // Some triangles are cut, as if they were larger.
         let spacing = |triangle: usize| {
             let of_ball = case.scene.shadings[triangle].material == 0;
-            of_ball.then_some(if triangle % 40 == 0 { 0.008 } else { 0.1 })
+            of_ball.then_some(if triangle % 6 == 0 { 0.008 } else { 0.1 })
         };
         *cache = Cache::new(geometry, spacing, 100_000);
-        let all: Vec<usize> = (0..cache.patches.len()).collect();
-        cache.refine(geometry, &all[..2 * all.len() / 3]);
-        cache.refine(geometry, &all[..all.len() / 3]);
+        let is_whole = |number: &usize| cache.lattices[cache.patches[*number].triangle].patches == 1;
+        let whole: Vec<usize> = (0..cache.patches.len()).filter(is_whole).collect();
+        cache.refine(geometry, &whole[..2 * whole.len() / 3]);
+        cache.refine(geometry, &whole[..whole.len() / 3]);
         cases.push(case);
     }
     Ok(cases)

@@ -133,7 +133,6 @@ mutants! {
     "reflect.comp", "lost factor", "kernel.reflect": "(c * c * c * c * c)" => "(c * c * c * c)";
     "irradiance.comp", "lost factor", "kernel.irradiance": "light *= crossing(m, c, share);" => "";
     "irradiance.comp", "index", "kernel.irradiance": "uvec2(index, POINTS_ROW" => "uvec2(index + 1u, POINTS_ROW";
-    "irradiance.comp", "lost condition", "kernel.irradiance": "if (point.area == 0.0) return;" => "";
     "cached.glsl", "index", "kernel.accumulate": "(j == 0u ? 1u : 2u)" => "1u";
     "cached.glsl", "swapped branch", "kernel.accumulate": "uint b = upper ? above : right" => "uint b = upper ? right : above";
     "cached.glsl", "index", "kernel.accumulate": "j * (2u * n - j) + 2u * i" => "j * (2u * n - j - 1u) + 2u * i";
