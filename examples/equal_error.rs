@@ -3,6 +3,10 @@
 //! EXR file; relMSE (as `render --error` has it) is against a converged image of another seed.
 //!
 //!     cargo run --release --example equal_error [SAMPLES OF THE CONVERGED IMAGE [SCENE]]
+//!
+//! Or the most memory that one render takes, start and image included:
+//!
+//!     cargo run --release --example equal_error peak SCENE METHOD SAMPLES
 
 use glam::{DAffine3, DVec3};
 use std::{collections::HashMap, error::Error, f64::consts::PI, time::Instant};
@@ -232,34 +236,58 @@ impl Subject {
     }
 }
 
-fn render(scene: &Scene, settings: &Settings, samples: u32) -> Outcome<Image> {
-    let mut renderer = Renderer::new(&Device::open(&DeviceOptions::default())?, scene, settings)?;
+fn render(scene: Scene, settings: &Settings, samples: u32) -> Outcome<Image> {
+    let mut renderer = Renderer::new(&Device::open(&DeviceOptions::default())?, &scene, settings)?;
+    // The renderer has what it needs of it.
+    drop(scene);
     renderer.render(samples)?;
     Ok(renderer.finish()?)
 }
 
+/// What is compared: probes lit by shadow rays, by kept light, and a cloud of points.
+fn methods() -> [(&'static str, Settings); 3] {
+    let sample = Settings { resolution: Some((512, 512)), ..Settings::default() };
+    let cached = Settings { irradiance: Irradiance::Cached, ..sample.clone() };
+    let cloud = Settings { integrator: Integrator::Cloud, ..sample.clone() };
+    [("sample", sample), ("cached", cached), ("cloud", cloud)]
+}
+
+/// The most memory that this process had so far (MB), where Linux tells.
+fn peak() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?;
+    Some(kib.parse::<f64>().ok()? * 1.024e-3)
+}
+
 fn main() -> Outcome<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [mode, scene, method, samples] = &arguments[..]
+        && mode == "peak"
+    {
+        let (_, settings) = methods().into_iter().find(|(name, _)| name == method).ok_or("no such method")?;
+        // Without the meshes of an application.
+        let scene = subject(scene)?.scene()?;
+        render(scene, &settings, samples.parse()?)?;
+        println!("{:.0} MB", peak().ok_or("only Linux tells")?);
+        return Ok(());
+    }
     let converged: u32 = arguments.first().map_or(Ok(128), |text| text.parse())?;
     let file = std::env::temp_dir().join(format!("equal_error.{}.exr", std::process::id()));
     println!("{:<16} {:<10} {:>9} {:>8} {:>8} {:>9}", "SCENE", "METHOD", "TRIANGLES", "SAMPLES", "TIME [s]", "relMSE");
     for name in NAMES.into_iter().filter(|name| arguments.get(1).is_none_or(|wanted| wanted == name)) {
-        let settings = Settings { resolution: Some((512, 512)), ..Settings::default() };
         let subject = subject(name)?;
-        let reference = render(&subject.scene()?, &Settings { seed: 1000, ..settings.clone() }, converged)?;
-        let sample = settings.clone();
-        let cached = Settings { irradiance: Irradiance::Cached, ..settings.clone() };
-        let cloud = Settings { integrator: Integrator::Cloud, ..settings };
-        for (method, settings) in [("sample", sample), ("cached", cached), ("cloud", cloud)] {
+        let [(_, sample), ..] = methods();
+        let reference = render(subject.scene()?, &Settings { seed: 1000, ..sample }, converged)?;
+        for (method, settings) in methods() {
             for samples in SAMPLES {
                 let start = Instant::now();
                 let scene = subject.scene()?;
-                let image = render(&scene, &settings, samples)?;
+                let triangles = scene.triangles.len();
+                let image = render(scene, &settings, samples)?;
                 image.write(&file)?;
                 let time = start.elapsed().as_secs_f64();
                 let error = image.relative_mse(&reference)?.mean;
                 if error <= ENOUGH || samples == SAMPLES[SAMPLES.len() - 1] {
-                    let triangles = scene.triangles.len();
                     println!("{name:<16} {method:<10} {triangles:>9} {samples:>8} {time:>8.2} {error:>9.5}");
                     break;
                 }

@@ -224,6 +224,21 @@ impl Buffer {
         data
     }
 
+    /// Whether the host reads its content in place.
+    pub fn is_mapped(&self) -> bool {
+        self.memory.mapped.is_some()
+    }
+
+    /// The `T` at `index`. No submitted recording may be writing it.
+    ///
+    /// # Panics
+    /// If the host cannot reach the buffer's memory, or it ends before.
+    pub fn read_one<T: Pod>(&self, index: usize) -> T {
+        let mut one = T::zeroed();
+        self.read_at((index * size_of::<T>()) as u64, bytemuck::bytes_of_mut(&mut one));
+        one
+    }
+
     fn write_at(&self, offset: u64, data: &[u8]) {
         let start = self.mapped(offset, data.len());
         // SAFETY: `mapped` checked the range; no reference points into it and no other thread is here.

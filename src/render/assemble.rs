@@ -1,10 +1,10 @@
 //! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it. Every value is
 //! finite: what exceeds f32 is its largest number.
 
-use super::{Renderer, own, spirv_hash};
+use super::{Band, Renderer, own, spirv_hash};
 use crate::{
     error::Result,
-    gpu::{Buffer, download_to},
+    gpu::{Buffer, download_to, give_back_freed},
     image::{Attribute, Channel, Image},
     settings::{Cache, Cloud, Integrator, Irradiance},
     shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
@@ -32,20 +32,18 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     let has_variance = renderer.prepared.features.batches != 0 && range.end - range.start >= BATCHES;
 
     // The device has the geometry already, so the host need not keep it while rendering.
-    let geometry =
-        Geometry { triangles: whole(renderer, Slot::Triangles)?, shadings: whole(renderer, Slot::Shadings)? };
+    let geometry = Geometry { triangles: copy(renderer, Slot::Triangles)?, shadings: copy(renderer, Slot::Shadings)? };
     let mut channels = Channels::new(count, has_variance);
     let (mut invalid, mut total, mut most) = (0u64, 0u64, 0);
-    for band in 0..renderer.bands.len() {
+    // First the band on the device, which need not go to the host then.
+    let mut order: Vec<usize> = (0..renderer.bands.len()).collect();
+    order.sort_by_key(|band| renderer.resident != Some(*band));
+    for band in order {
         renderer.make_resident(band)?;
-        let pixels = renderer.bands[band].pixels;
-        let step = Step {
-            first_row: renderer.bands[band].first_row,
-            pixel_count: pixels,
-            pixel_centre: 1,
-            range_begin: range.start,
-            ..Step::default()
-        };
+        let Band { pixels, first_row, .. } = renderer.bands[band];
+        let first = ((first_row - rows.start) * view.crop_width) as usize;
+        let step =
+            Step { first_row, pixel_count: pixels, pixel_centre: 1, range_begin: range.start, ..Step::default() };
         // The G-buffer of batch 0 is overwritten; its stratum is traced anew before the next sample.
         renderer.strata[0] = None;
         let Renderer { recorder, kernels, bindings, .. } = renderer;
@@ -60,15 +58,16 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
         drop(span);
-        for (pixel, surface) in resolved.iter().zip(&surfaces) {
+        for (index, (pixel, surface)) in (first..).zip(resolved.iter().zip(&surfaces)) {
             invalid += u64::from(pixel.invalid);
             total += u64::from(pixel.samples);
             most = most.max(pixel.samples);
-            channels.push(pixel, &centre(renderer, &geometry, surface));
+            channels.set(index, pixel, &centre(renderer, &geometry, surface));
         }
         if sums == Sums::Freed {
             renderer.resident = None;
             renderer.bands[band].free(range.start);
+            give_back_freed();
         }
     }
     let counts = if renderer.adaptive {
@@ -110,10 +109,21 @@ pub(super) fn whole<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result
     read(renderer, slot, bytes / size_of::<T>())
 }
 
-/// The scene's triangles.
+/// The same where the host does not read them in place.
+fn copy<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result<Option<Vec<T>>> {
+    if renderer.buffer(slot).is_some_and(Buffer::is_mapped) { Ok(None) } else { whole(renderer, slot).map(Some) }
+}
+
+/// An element of a slot, or of its copy.
+fn element<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot, copy: &Option<Vec<T>>, index: u32) -> T {
+    let in_place = || renderer.buffer(slot).expect("it is mapped").read_one(index as usize);
+    copy.as_ref().map_or_else(in_place, |elements| elements[index as usize])
+}
+
+/// Copies of the scene's triangles where there have to be.
 struct Geometry {
-    triangles: Vec<Triangle>,
-    shadings: Vec<Shading>,
+    triangles: Option<Vec<Triangle>>,
+    shadings: Option<Vec<Shading>>,
 }
 
 /// What the middle of a pixel shows.
@@ -131,8 +141,8 @@ fn centre(renderer: &Renderer, geometry: &Geometry, surface: &Surface) -> Centre
     if surface.triangle == MISS {
         return Centre { normal: Vec3::ZERO, position: DVec3::ZERO, depth: 0.0, material: -1 };
     }
-    let triangle = &geometry.triangles[surface.triangle as usize];
-    let shading = &geometry.shadings[surface.triangle as usize];
+    let triangle = element(renderer, Slot::Triangles, &geometry.triangles, surface.triangle);
+    let shading = element(renderer, Slot::Shadings, &geometry.shadings, surface.triangle);
     let [b1, b2] = surface.barycentric.to_array();
     let normal = (shading.normal0 * (1.0 - b1 - b2) + shading.normal1 * b1 + shading.normal2 * b2).normalize();
     let frame = renderer.frame;
@@ -193,11 +203,11 @@ struct Channels {
 
 impl Channels {
     fn new(count: usize, has_variance: bool) -> Channels {
-        let channel = |name: &'static str| Channel { name: name.into(), data: Vec::with_capacity(count) };
+        let channel = |name: &'static str| Channel { name: name.into(), data: vec![0.0; count] };
         Channels { list: names(has_variance).map(channel).collect(), has_variance }
     }
 
-    fn push(&mut self, pixel: &Pixel, centre: &Centre) {
+    fn set(&mut self, index: usize, pixel: &Pixel, centre: &Centre) {
         // Two finite layers may exceed f32 together.
         let light = (pixel.subsurface + pixel.reflection).min(Vec3::MAX);
         let position = centre.position.as_vec3();
@@ -213,7 +223,7 @@ impl Channels {
             values.extend(pixel.variance.to_array());
         }
         for (channel, value) in self.list.iter_mut().zip(values) {
-            channel.data.push(value);
+            channel.data[index] = value;
         }
     }
 }

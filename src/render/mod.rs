@@ -19,7 +19,7 @@ pub use record::Output;
 
 use crate::{
     error::{Error, Result},
-    gpu::{Bindings, Buffer, Device, Extent, Kernel, Layout, Location, Recorder, download, upload},
+    gpu::{Bindings, Buffer, Device, Extent, Kernel, Layout, Location, Recorder, download, give_back_freed, upload},
     image::Image,
     prepare::{Prepared, prepare},
     reference::random,
@@ -47,6 +47,7 @@ const WRITTEN: [Slot; 4] = [Slot::Views, Slot::Lights, Slot::Materials, Slot::Pr
 macro_rules! kernels {
     ($($stem:ident),*) => {
         /// The compute pipelines that a scene needs, specialised to its features; none of the others.
+        #[derive(Default)]
         struct Kernels { $($stem: Option<Kernel>,)* }
 
         impl Kernels {
@@ -201,6 +202,7 @@ impl Renderer {
         let span = timeline::begin(&settings.timeline, "prepare");
         let mut prepared = prepared(scene, settings)?;
         change(&mut prepared);
+        give_back_freed();
         drop(span);
         let limits = Limits::of(device);
         let bands = bands::split(limits, &prepared, settings)?;
@@ -476,7 +478,10 @@ impl Renderer {
         let worked = listed.unwrap_or(pixels);
         self.pace.note(start, u64::from(worked) * samples.len() as u64);
         let name = if self.warm { "submission" } else { "first dispatch" };
-        self.warm = true;
+        if !std::mem::replace(&mut self.warm, true) {
+            // What drivers take to translate, and what the caller has dropped since.
+            give_back_freed();
+        }
         self.note(name, Work { band: band as u32, pixels: worked, samples });
         Ok(())
     }
@@ -498,6 +503,10 @@ impl Renderer {
 
     /// As [`Renderer::take_image`], for the last time.
     pub fn finish(mut self) -> Result<Image> {
+        // What a driver keeps of kernels is as much as a small image.
+        let Kernels { primary, resolve, .. } = self.kernels;
+        self.kernels = Kernels { primary, resolve, ..Kernels::default() };
+        give_back_freed();
         self.take_image()
     }
 

@@ -3,11 +3,11 @@
 use super::{
     Progress, Renderer,
     bands::{self, Band, Film},
-    own,
+    find, own,
 };
 use crate::{
     error::{Error, Result},
-    gpu::{Device, download_to, upload},
+    gpu::{Buffer, Device, download_to, upload},
     scene::{self, Scene},
     shared::{BATCHES, Slot},
     timeline,
@@ -57,13 +57,18 @@ impl Renderer {
         if !*changed && kept.is_some() {
             return Ok(());
         }
-        for (data, slot) in self.spare.iter_mut().zip(SUMS) {
-            let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
+        let buffer = |slot: Slot| find(&self.buffers, slot);
+        // A copy that may fail must not take the place of what is there: half new and half old it would be of no use.
+        let direct = SUMS.into_iter().filter_map(buffer).all(Buffer::is_mapped);
+        let copies = if direct { &mut *sums } else { &mut self.spare };
+        for (data, slot) in copies.iter_mut().zip(SUMS) {
+            let Some(buffer) = buffer(slot) else { continue };
             data.resize(bands::bytes(slot, &self.prepared.features, *pixels) as usize, 0);
             download_to(&self.device, buffer, data)?;
         }
-        // Half new and half old they would be of no use.
-        std::mem::swap(sums, &mut self.spare);
+        if !direct {
+            std::mem::swap(sums, &mut self.spare);
+        }
         (*kept, *changed) = (Some(*end), false);
         self.kept_at = Instant::now();
         Ok(())
