@@ -34,7 +34,7 @@ fn wrong_usage_and_input_end_with_2_and_a_message_and_leave_nothing() {
         ("render SPOT --irradiance cached --cache-samples 1", "--cache-samples"),
         ("render SPOT --irradiance cached --cache-points 1000000", "--cache-points"),
         ("render SPOT --irradiance cached --cache-spacing 0", "cache spacing"),
-        ("render SPOT --irradiance cached --cache-tolerance -1", "--cache-tolerance"),
+        ("render SPOT --irradiance cached --cache-tolerance=-1", "--cache-tolerance"),
         ("render SPOT --projection sideways", "sideways"),
         ("render SPOT --model magic", "magic"),
         ("render missing.glb", "missing.glb"),
