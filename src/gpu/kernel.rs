@@ -235,7 +235,7 @@ impl Kernel {
     }
 
     /// As [`Kernel::new`], once for each device: whoever asks for the same again shares what was compiled. A device
-    /// keeps all that it compiled, a few hundred kilobytes each, as long as it lives.
+    /// keeps all that it compiled, some two megabytes each on lavapipe, as long as it lives.
     ///
     /// # Errors
     /// As [`Kernel::new`].

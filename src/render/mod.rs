@@ -47,7 +47,6 @@ const WRITTEN: [Slot; 4] = [Slot::Views, Slot::Lights, Slot::Materials, Slot::Pr
 macro_rules! kernels {
     ($($stem:ident),*) => {
         /// The compute pipelines that a scene needs, specialised to its features; none of the others.
-        #[derive(Default)]
         struct Kernels { $($stem: Option<Kernel>,)* }
 
         impl Kernels {
@@ -503,10 +502,6 @@ impl Renderer {
 
     /// As [`Renderer::take_image`], for the last time.
     pub fn finish(mut self) -> Result<Image> {
-        // What a driver keeps of kernels is as much as a small image.
-        let Kernels { primary, resolve, .. } = self.kernels;
-        self.kernels = Kernels { primary, resolve, ..Kernels::default() };
-        give_back_freed();
         self.take_image()
     }
 

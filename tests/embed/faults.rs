@@ -375,7 +375,7 @@ fn lose(job: &Job, keep: Option<Duration>, [device, other]: &[Device; 2], lost_a
     let uploads = set(None, false);
     made.render_rest(0..job.samples, &mut |_| ControlFlow::Continue(())).expect("no fault is set");
     let rendering = set(None, false);
-    drop((made.image().expect("no fault is set"), made));
+    drop((made.take_image().expect("no fault is set"), made));
     let finishing = set(None, false);
     let before = live();
     for (first, function) in [(1, "vkQueueSubmit2"), (2, "vkWaitForFences")] {
