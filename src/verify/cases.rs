@@ -243,7 +243,7 @@ pub(super) fn kept() -> Result<Vec<Case>> {
         // Some triangles are cut, as if they were larger.
         let spacing = |triangle: usize| {
             let of_ball = case.scene.shadings[triangle].material == 0;
-            of_ball.then_some(if triangle % 6 == 0 { 0.008 } else { 0.1 })
+            of_ball.then_some(if triangle.is_multiple_of(6) { 0.008 } else { 0.1 })
         };
         *cache = Cache::new(geometry, spacing, 100_000);
         let is_whole = |number: &usize| cache.lattices[cache.patches[*number].triangle].patches == 1;
