@@ -8,12 +8,8 @@ use crate::{
     shared::{ACTIVE_HEADER, BATCHES, Features, GATHER_POINTS, REPROJECT_SCREEN, Slot},
 };
 
-/// Pixels of a band where nothing else limits it: enough to fill a GPU.
+/// Pixels of a band where nothing else limits it: enough to fill a GPU, few enough for a processor's caches.
 const BAND_PIXELS: u32 = 1 << 18;
-
-/// Least pixels and rows of a full band on a processor, which few fill and whose memory is the host's. With fewer rows
-/// edges of bands cut many tiles: relMSE is 3 % above that of one band with 128, 7 % with 64, 15 % with 32.
-const PROCESSOR: [u32; 2] = [1 << 16, 128];
 
 /// The same where the host computes light: few enough for progress to be seen.
 const HOST_PIXELS: u32 = 1 << 14;
@@ -118,11 +114,7 @@ pub fn split(limits: Limits, prepared: &Prepared, settings: &Settings) -> Result
     let width = prepared.view.crop_width;
     // Half of the memory is left to the scene and to others. Whether it suffices at all is asked later.
     let memory = limits.heap_bytes.min(if limits.shared { limits.host_bytes } else { u64::MAX });
-    let pixels = match (prepared.on_host, limits.shared) {
-        (true, _) => HOST_PIXELS,
-        (false, true) => BAND_PIXELS.min(PROCESSOR[0].max(PROCESSOR[1].saturating_mul(width))),
-        (false, false) => BAND_PIXELS,
-    };
+    let pixels = if prepared.on_host { HOST_PIXELS } else { BAND_PIXELS };
     // A point may lie in any pixel of the G-buffer.
     let looks_up = prepared.features.reproject == REPROJECT_SCREEN;
     let wanted = match settings.recording || looks_up {
