@@ -1,4 +1,5 @@
-// Adds the light of shadow rays to one point whose light is kept, as of the cloud. The mathematics is in src/reference/irradiance.rs.
+// Adds the light of shadow rays to one point whose light is kept, as of the cloud. The mathematics is in
+// src/reference/irradiance.rs.
 #version 460
 #include "shared.glsl"
 #include "math.glsl"
@@ -45,7 +46,9 @@ void main() {
     }
     vec3 tint = vec3(point.area);
     // Between points pixels bring their own.
-    if (IRRADIANCE != IRRADIANCE_CACHED && has_texture(TEXTURE_BASE_COLOR)) tint *= texture_value(TEXTURE_BASE_COLOR, point.triangle, point.barycentric).rgb;
+    if (IRRADIANCE != IRRADIANCE_CACHED && has_texture(TEXTURE_BASE_COLOR)) {
+        tint *= texture_value(TEXTURE_BASE_COLOR, point.triangle, point.barycentric).rgb;
+    }
     clusters[number].flux = point.flux + flux * tint;
     clusters[number].oblique = point.oblique + oblique * tint;
 }

@@ -26,7 +26,7 @@ pub use commands::{Commands, Extent, Timestamps};
 pub use counters::Counter;
 pub use device::{Device, DeviceOptions, RawDevice};
 pub use executables::{Executable, Statistic};
-pub use host::give_back_freed;
+pub(crate) use host::give_back_freed;
 pub use instance::{DeviceInfo, DeviceKind, ValidationLog};
 pub use kernel::{Bindings, Kernel, Layout};
 pub use memory::{Allocation, Allocator, MemoryRequest};

@@ -374,7 +374,7 @@ structs! {
         /// End of those that light the cloud.
         range_end: u32,
         /// Node of the cloud's tree: the first one of `cluster`'s level, the one that `gather` starts from. The first of the
-    /// points that `irradiance` lights.
+        /// points that `irradiance` lights.
         node: u32,
         /// The unscrambled point number sample_index / BATCHES of the sequence, dimensions 0 to DIMENSIONS - 1.
         point: [u32; 5],
