@@ -25,6 +25,15 @@ float emitter_density(View view, uint triangle) {
     return emitters[low].triangle == triangle ? emitters[low].density : 0.0;
 }
 
+// Probability that a ray from a position goes to a point of an emitter, rather than in a direction.
+float emitter_share(View view, vec3 position) {
+    if (EMISSIVE == 0) return 0.0;
+    if (ENVIRONMENT_KIND != ENVIRONMENT_NONE) return 0.5;
+    vec3 to = view.emitters_centre - position;
+    float ratio = view.emitters_radius2 / dot(to, to);
+    return 1.0 - 0.5 * min(ratio * ratio, 1.0);
+}
+
 // Radiance over the sum of two densities per solid angle: `directional`, and `density` per area at this distance.
 vec3 combined(vec3 radiance, float density, float distance, uint triangle, vec3 direction, float directional) {
     float c = abs(dot(geometric_normal(triangles[triangle]), direction));

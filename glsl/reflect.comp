@@ -70,12 +70,19 @@ void main() {
         vec3 shares = translucent ? (image ? vec3(0.5, 0.5, 0.0) : vec3(0.0, 1.0, 0.0))
             : (image ? vec3(0.5, 0.25, 0.25) : vec3(0.0, 0.5, 0.5));
         uint key = pixel_key(view.seed, pixel_position(view, index));
-        uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
-        for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
+        uint next = step_.ray_begin;
+        bool to_emitter = false;
+        while (next < step_.ray_begin + step_.ray_count) {
+            // Where there are emitters, a ray to a point of theirs goes before that in each direction.
+            uint k = next;
+            to_emitter = EMISSIVE != 0 && k >= view.light_count && !mirror && !to_emitter;
+            if (!to_emitter) next++;
+            // A mirror has one direction.
+            if (mirror && k != view.light_count) continue;
             vec3 direction;
             float distance = 1e30;
             vec3 light = vec3(0.0);
-            bool direction_ray = k >= first_direction;
+            bool direction_ray = k >= view.light_count && !to_emitter;
             EmitterPoint point;
             point.triangle = MISS;
             if (k < view.light_count) {
@@ -83,7 +90,7 @@ void main() {
                 direction = incoming.direction;
                 distance = incoming.distance;
                 light = incoming.irradiance;
-            } else if (EMISSIVE != 0 && !direction_ray) {
+            } else if (to_emitter) {
                 vec2 u = random_point(key, sample_index() % BATCHES, DIM_EMITTER_REFLECT,
                     sample_index() / BATCHES * view.directions + k - view.light_count);
                 point = draw_emitter(view, s.position, offset, u);
@@ -91,7 +98,7 @@ void main() {
                 distance = point.distance * EMITTER_REACH;
                 light = emitted(point.triangle, point.barycentric, direction);
             } else {
-                uint j = k - first_direction;
+                uint j = k - view.light_count;
                 vec2 u = random_point(key, sample_index() % BATCHES, DIM_REFLECT,
                     sample_index() / BATCHES * view.directions + j);
                 if (mirror) {
@@ -112,7 +119,7 @@ void main() {
             vec3 weight = vec3(0.0);
             float density = 0.0;
             if (mirror) {
-                weight = vec3(k == first_direction ? fresnel(m.ior, wo.z) : 0.0);
+                weight = vec3(fresnel(m.ior, wo.z));
                 light *= weight;
             } else if (open) {
                 weight = reflected(m, translucent, alpha, wo, wi);
@@ -123,7 +130,7 @@ void main() {
                 }
                 if (direction_ray) light = density > 0.0 ? light / (density * float(view.directions)) : vec3(0.0);
                 weight /= float(view.directions);
-                if (EMISSIVE != 0 && point.triangle != MISS) {
+                if (to_emitter) {
                     light = combined(light, point.density, point.distance, point.triangle, direction, density)
                         / float(view.directions);
                 }
@@ -144,7 +151,7 @@ void main() {
             }
             if (open && hit_count == 0u) radiance += light;
         }
-        if (step_.first != 0) radiance += m.emission;
+        if (step_.first != 0 && (s.side > 0.0 || (m.flags & TWO_SIDED) != 0)) radiance += m.emission;
     }
     add_reflection(index, radiance);
 }

@@ -176,6 +176,10 @@ const uint DIM_SINGLE_LIGHT = 18u;
 const uint DIM_SINGLE_EMITTER = 20u;
 // Dimension of the hash that draws where tabulated profiles of a tile's hits are read.
 const uint DIM_REUSE = 22u;
+// Dimension: whether a ray goes to a point of an emitter, for the exit (a number per direction).
+const uint DIM_SOURCE = 23u;
+// Dimension: the same, for single scattering.
+const uint DIM_SINGLE_SOURCE = 24u;
 // 2^32 over the golden ratio: the step of numbers that cover [0, 1) evenly.
 const uint GOLDEN = 2654435769u;
 // Added to a dimension for what the place in a tile brings to it.
@@ -324,12 +328,16 @@ struct View {
     uint crop_width;
     // Key of all random numbers.
     uint seed;
-    // Incoming environment directions at each position, N.
+    // Incoming directions at each position, N, of the environment and of emitters.
     uint directions;
     // Delta lights in the scene.
     uint light_count;
     // Triangles that emit light.
     uint emitter_count;
+    // Centre of a ball around them.
+    vec3 emitters_centre;
+    // Square of its radius.
+    float emitters_radius2;
     // 1 to add the environment where a camera ray hits nothing.
     uint show_environment;
     // Tiles: twice the number of sets.
@@ -363,7 +371,7 @@ struct Step {
     uint sample_index;
     // 1 to trace `primary` through the pixel's centre, for the AOVs.
     uint pixel_centre;
-    // First shadow ray of this dispatch: delta lights first, then points of emitters, then directions.
+    // First shadow ray of this dispatch: delta lights first, then directions.
     uint ray_begin;
     // Shadow rays of this dispatch; 0 where the scene has no light.
     uint ray_count;

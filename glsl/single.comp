@@ -88,8 +88,8 @@ void main() {
     float depth = 0.0;
     vec3 over_density = vec3(0.0);
     // Of the light that is connected: its rays' direction and end, what is there, which part of it arrives.
-    uint first_direction = view.light_count + (EMISSIVE != 0 ? view.directions : 0u);
     uint target = MISS;
+    float share = 0.0;
     float directional = 0.0;
     vec3 light = vec3(0.0);
     vec3 part = vec3(0.0);
@@ -109,30 +109,33 @@ void main() {
             vec3 position = s.position + depth * d;
             target = MISS;
             directional = 0.0;
+            share = emitter_share(view, position);
+            uint j = sample_index() / BATCHES * view.directions + (k - view.light_count);
             if (k < view.light_count) {
                 Incoming incoming = delta_light(k, position);
                 direction = incoming.direction;
                 distance = incoming.distance;
                 light = incoming.irradiance;
-            } else if (EMISSIVE != 0 && k < first_direction) {
-                vec2 v = random_point(key, batch, DIM_SINGLE_EMITTER,
-                    sample_index() / BATCHES * view.directions + (k - view.light_count));
-                EmitterPoint point = draw_emitter(view, s.position, depth * d, v);
+            } else if (EMISSIVE != 0 && unit(dimension_key(key, batch, DIM_SINGLE_SOURCE) + GOLDEN * j) < share) {
+                EmitterPoint point =
+                    draw_emitter(view, s.position, depth * d, random_point(key, batch, DIM_SINGLE_EMITTER, j));
                 direction = point.direction;
                 distance = point.distance * EMITTER_REACH;
                 target = point.triangle;
-                light = combined(emitted(target, point.barycentric, direction), point.density, point.distance, target,
-                    direction, direction_density(view, m, chances, d, n, direction)) / float(view.directions);
+                light = combined(emitted(target, point.barycentric, direction), share * point.density, point.distance,
+                    target, direction, (1.0 - share) * direction_density(view, m, chances, d, n, direction))
+                    / float(view.directions);
             } else {
-                vec2 v = random_point(key, batch, DIM_SINGLE_LIGHT,
-                    sample_index() / BATCHES * view.directions + (k - first_direction));
+                vec2 v = random_point(key, batch, DIM_SINGLE_LIGHT, j);
                 bool image = ENVIRONMENT_KIND == ENVIRONMENT_IMAGE;
                 if (image && v.x < 0.5) {
                     direction = draw_environment(view, vec2(2.0 * v.x, v.y));
                 } else {
                     direction = draw_direction(m, chances, d, n, vec2(image ? 2.0 * v.x - 1.0 : v.x, v.y));
                 }
-                if (direction != vec3(0.0)) directional = direction_density(view, m, chances, d, n, direction);
+                if (direction != vec3(0.0)) {
+                    directional = (1.0 - share) * direction_density(view, m, chances, d, n, direction);
+                }
                 light = directional > 0.0 ? environment_radiance(view, direction) / (directional * float(view.directions))
                     : vec3(0.0);
                 distance = 1e30;
@@ -195,11 +198,12 @@ void main() {
             bool seen_light = hit_count == 0u;
             if (EMISSIVE != 0 && hit_count != 0u) {
                 uint found = hit_triangle[0];
-                if (k >= first_direction) {
-                    light = combined(emitted(found, hit_barycentric, direction), emitter_density(view, found),
+                bool direction_ray = k >= view.light_count && target == MISS;
+                if (direction_ray) {
+                    light = combined(emitted(found, hit_barycentric, direction), share * emitter_density(view, found),
                         along + hit_t[0], found, direction, directional) / float(view.directions);
                 }
-                seen_light = k >= first_direction || found == target;
+                seen_light = direction_ray || found == target;
             }
             if (seen_light) radiance += light * part;
         }

@@ -66,6 +66,11 @@ float coordinate(Place place, uint key, uint batch, uint dimension) {
     return unit(v);
 }
 
+// Number `index` of a place's sequence of steps by the golden ratio, alike at all places of a tile.
+float golden_at(Place place, uint key, uint batch, uint dimension, uint index) {
+    return unit(dimension_key(key, batch, dimension) + GOLDEN * (index * max(REUSE * REUSE, 1u) + place.at));
+}
+
 // As `random_point`, at a place.
 vec2 point_at(Place place, uint key, uint batch, uint dimension, uint index) {
     if (REUSE == 0u) return random_point(key, batch, dimension, index);

@@ -69,8 +69,7 @@ pub struct Prepared {
     /// Whether light can leave a first surface without having entered it, or the environment is shown: otherwise
     /// `reflect` does not run.
     pub has_reflection: bool,
-    /// Shadow rays of one position: one for each delta light, N to points of emitters if there are any, N directions if
-    /// there is an environment or an emitter.
+    /// Shadow rays of one position: one for each delta light, N directions if there is an environment or an emitter.
     pub ray_count: u32,
 }
 
@@ -208,6 +207,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     view.directions = settings.directions;
     view.light_count = lights.len() as u32;
     view.emitter_count = emitters.len() as u32;
+    (view.emitters_centre, view.emitters_radius2) = emitter::ball(&scene.triangles, &emitters);
     view.groups = 2 * scene.sets.len() as u32;
     view.leaves = clusters.len() as u32 / 2;
     view.opening = settings.cloud.opening as f32;

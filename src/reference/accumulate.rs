@@ -29,12 +29,12 @@ use super::projection::{
 };
 use super::rough::{crossing, leaving_share};
 use super::sums::Contribution;
-use super::tile::{Place, coordinate, direction_point};
+use super::tile::{Place, coordinate, direction_point, golden};
 use super::{Inputs, cached, emitter, intersect, mixture, texture};
 use crate::shared::{
-    DIM_EMITTER, DIM_HIT, DIM_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE, IRRADIANCE_CACHED,
-    MAX_HITS, MISS, MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe, RECIPROCAL, SHADOW_OFFSET,
-    Step, Surface, TEXTURE_BASE_COLOR, Triangle,
+    DIM_EMITTER, DIM_HIT, DIM_LIGHT, DIM_SOURCE, EMITTER_REACH, ENVIRONMENT_IMAGE, Hits, INTEGRATOR_SAMPLE,
+    IRRADIANCE_CACHED, MAX_HITS, MISS, MODEL_DIRECTIONAL, MODEL_LAMBERT, Material, PROJECTION_CAMERA, Probe,
+    RECIPROCAL, SHADOW_OFFSET, Step, Surface, TEXTURE_BASE_COLOR, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -49,22 +49,22 @@ pub(super) fn visibility(inputs: &Inputs, origin: DVec3, wi: DVec3, distance: f6
     if intersect::any(inputs, origin, wi, 0.0, distance) { 0.0 } else { 1.0 }
 }
 
-/// Light of a point of an emitter over both densities; `pdf` is that of the directions. 0 where it is hidden.
-pub(super) fn from_emitter(inputs: &Inputs, origin: DVec3, point: &emitter::Point, pdf: f64) -> DVec3 {
+/// Light of a point of an emitter over n_E p_E + n_D p_D; `pdf` is n_D p_D. 0 where it is hidden.
+pub(super) fn from_emitter(inputs: &Inputs, origin: DVec3, point: &emitter::Point, points: f64, pdf: f64) -> DVec3 {
     let reach = point.distance * f64::from(EMITTER_REACH);
     let hit = intersect::closest(inputs, origin, point.wi, 0.0, reach);
     let hidden = hit.is_some_and(|hit| hit.triangle != point.triangle);
     // A point seen along its own surface has no solid angle.
-    if hidden || !point.density.is_finite() { DVec3::ZERO } else { point.radiance / (point.density + pdf) }
+    if hidden || !point.density.is_finite() { DVec3::ZERO } else { point.radiance / (points * point.density + pdf) }
 }
 
-/// Light from the direction `wi` over its density: an emitter's or the environment's, which counts over `pdf` alone.
-pub(super) fn from_direction(inputs: &Inputs, origin: DVec3, wi: DVec3, pdf: f64) -> DVec3 {
+/// Light from the direction `wi` over its density: an emitter's, or the environment's over `pdf` = n_D p_D alone.
+pub(super) fn from_direction(inputs: &Inputs, origin: DVec3, wi: DVec3, points: f64, pdf: f64) -> DVec3 {
     if inputs.features.emitters != 0
         && let Some(hit) = intersect::closest(inputs, origin, wi, 0.0, FAR)
     {
         let radiance = emitter::radiance(inputs, hit.triangle, hit.barycentric, wi);
-        return radiance / (emitter::density(inputs, hit.triangle, wi, hit.t) + pdf);
+        return radiance / (points * emitter::density(inputs, hit.triangle, wi, hit.t) + pdf);
     }
     light::environment(inputs, wi) / pdf * visibility(inputs, origin, wi, FAR)
 }
@@ -305,8 +305,8 @@ pub(super) fn entering_light(
     value: impl Fn(DVec3) -> DVec3,
 ) -> DVec3 {
     let origin = lifted(entry.point, entry.normal);
-    let first_direction = inputs.features.first_direction(inputs.view);
     let directions = f64::from(inputs.view.directions);
+    let share = emitter::share(inputs, entry.point);
     let ray = |k: u32| -> DVec3 {
         // Most rays need not be traced.
         let entering = |wi: DVec3, light: &dyn Fn() -> DVec3| {
@@ -318,16 +318,16 @@ pub(super) fn entering_light(
             let visible = || visibility(inputs, origin, incident.wi, incident.distance);
             return entering(incident.wi, &|| incident.irradiance * visible());
         }
-        if k < first_direction {
-            let (u1, u2) = direction_point(inputs, step, place, k - inputs.view.light_count, DIM_EMITTER);
+        let point = |dimension| direction_point(inputs, step, place, k - inputs.view.light_count, dimension);
+        let pdf = |wi| (1.0 - share) * direction_pdf(inputs, entry.shading, wi);
+        if golden(inputs, step, place, k - inputs.view.light_count, DIM_SOURCE) < share {
+            let (u1, u2) = point(DIM_EMITTER);
             let point = emitter::draw(inputs, origin, u1, u2);
-            let pdf = direction_pdf(inputs, entry.shading, point.wi);
-            return entering(point.wi, &|| from_emitter(inputs, origin, &point, pdf) / directions);
+            return entering(point.wi, &|| from_emitter(inputs, origin, &point, share, pdf(point.wi)) / directions);
         }
-        let (u1, u2) = direction_point(inputs, step, place, k - first_direction, DIM_LIGHT);
+        let (u1, u2) = point(DIM_LIGHT);
         let wi = direction(inputs, entry.shading, u1, u2);
-        let pdf = direction_pdf(inputs, entry.shading, wi);
-        entering(wi, &|| from_direction(inputs, origin, wi, pdf) / directions)
+        entering(wi, &|| from_direction(inputs, origin, wi, share, pdf(wi)) / directions)
     };
     (step.ray_begin..step.ray_begin + step.ray_count).map(ray).sum()
 }

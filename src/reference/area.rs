@@ -327,9 +327,9 @@ impl<'a> Surface<'a> {
     /// Irradiance at `x` that passes the surface, each direction times `weight`; the surrounding by one cosine-weighted
     /// direction.
     fn entering(&self, x: DVec3, normal: DVec3, rng: &mut Random, weight: impl Fn(DVec3) -> DVec3) -> DVec3 {
+        let start = x + normal * SHADOW_OFFSET;
         let lit = |wi: DVec3, distance: f64| -> DVec3 {
             let cos = normal.dot(wi);
-            let start = x + normal * SHADOW_OFFSET;
             if cos <= 0.0 || self.shadows.blocks(start, wi, distance) {
                 DVec3::ZERO
             } else {
@@ -346,9 +346,10 @@ impl<'a> Surface<'a> {
                 }
                 Lamp::Triangle { corners: [a, b, c], radiance, two_sided } => {
                     let (s, t) = inside(rng);
-                    let to = a + (b - a) * s + (c - a) * t - x;
+                    // From where the ray starts: at a grazing angle a lamp would hide a point of its own from elsewhere.
+                    let to = a + (b - a) * s + (c - a) * t - start;
                     let wi = to.normalize();
-                    // The area as it is seen from x.
+                    // The area as it is seen from there.
                     let seen = -(b - a).cross(c - a).dot(wi) / 2.0;
                     let seen = if two_sided { seen.abs() } else { seen.max(0.0) };
                     radiance * (seen / to.length_squared() * lit(wi, to.length() - 10.0 * SHADOW_OFFSET))

@@ -11,22 +11,27 @@
 //! rounds to nothing there is not drawn, P_k = 0.
 //!
 //! # Combination
-//! N points are drawn and N directions, with the density p_D of the cosine, the reflection or the environment image. Light
-//! L of an emitter counts with both, divided by the sum of both (balance heuristic; E. Veach, L. Guibas, SIGGRAPH 1995):
+//! Points of emitters are drawn, n_E of them in the mean, and n_D directions, with the density p_D of the cosine, the
+//! reflection or the environment image. Light L of an emitter counts with both, divided by the sum of both (balance
+//! heuristic; E. Veach, L. Guibas, SIGGRAPH 1995):
 //!
-//!   L / (N (p_E + p_D)) for each point that x sees, and for each direction in which the first surface is an emitter.
+//!   L / (n_E p_E + n_D p_D) for each point that x sees, and for each direction in which the first surface is an emitter.
 //!
 //! So no weight has a pole, neither where an emitter touches the surface (p_E -> 0 at fixed solid angle) nor where it
-//! is small and far. Directions that meet nothing are the environment's, those that meet other matter have no light.
+//! is small and far. Directions that meet nothing are the environment's, L / (n_D p_D); those that meet other matter have
+//! no light.
+//!
+//! Where light is reflected, n_E = n_D = N: a narrow lobe needs directions, a small lamp points. Where it enters matter,
+//! each of N rays is one or the other: a point with the probability q of [`share`], so that n_E = q N and n_D = (1 - q) N.
 //!
 //! # What emits
 //! Radiance is the same in all directions of the side from which the vertices run counter-clockwise, and of both sides
-//! where the material is two-sided. The camera sees emission from both sides.
+//! where the material is two-sided. The camera sees it so too.
 
 use super::projection::geometric_normal;
 use super::{Inputs, texture};
-use crate::shared::{Emitter, Material, Shading, TWO_SIDED, Triangle};
-use glam::{DVec2, DVec3};
+use crate::shared::{ENVIRONMENT_NONE, Emitter, Material, Shading, TWO_SIDED, Triangle};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Probabilities are multiples of its inverse.
 const STEPS: f64 = (1 << 24) as f64;
@@ -53,6 +58,32 @@ pub fn table(triangles: &[Triangle], shadings: &[Shading], materials: &[Material
         }
     }
     emitters
+}
+
+/// Centre and squared radius of a ball around the triangles that emit.
+pub fn ball(triangles: &[Triangle], emitters: &[Emitter]) -> (Vec3, f32) {
+    let corners = || emitters.iter().flat_map(|emitter| triangles[emitter.triangle as usize].vertices);
+    let box_of = |[low, high]: [Vec3; 2], corner: Vec3| [low.min(corner), high.max(corner)];
+    let Some([low, high]) = corners().map(|corner| [corner; 2]).reduce(|all, [corner, _]| box_of(all, corner)) else {
+        return (Vec3::ZERO, 0.0);
+    };
+    let centre = low.midpoint(high);
+    (centre, corners().map(|corner| corner.distance_squared(centre)).fold(0.0, f32::max))
+}
+
+/// The probability q that a ray from `x` goes to a point of an emitter. Any q in (0, 1] leaves the expectation as it is,
+/// and 1 too, for points reach all emitters, if nothing else shines. Then it is 1 - min(1, (R / d)^4) / 2, with the radius R
+/// of a ball around all emitters and the distance d of its centre: far from them points are as good as can be, near them
+/// 1 / d^2 varies. Beside an environment it is 1/2.
+pub fn share(inputs: &Inputs, x: DVec3) -> f64 {
+    if inputs.features.emitters == 0 {
+        return 0.0;
+    }
+    if inputs.features.environment != ENVIRONMENT_NONE {
+        return 0.5;
+    }
+    let ratio = f64::from(inputs.view.emitters_radius2) / x.distance_squared(inputs.view.emitters_centre.as_dvec3());
+    1.0 - 0.5 * ratio.powi(2).min(1.0)
 }
 
 fn area(triangle: &Triangle) -> f64 {

@@ -20,6 +20,7 @@ use super::tile::{Place, direction_point};
 use super::{Inputs, boundary, emitter, intersect, texture};
 use crate::shared::{
     DIM_EMITTER_REFLECT, DIM_REFLECT, ENVIRONMENT_IMAGE, MISS, Material, OPAQUE_ALPHA_MIN, Step, Surface, TRANSLUCENT,
+    TWO_SIDED,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -35,7 +36,8 @@ pub fn reflect(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> C
     let material =
         texture::surface(inputs, material(inputs, surface), surface.triangle, surface.barycentric.as_dvec2());
     let lobe = Lobe::new(&material, &seen);
-    let emitted = if step.first != 0 { lobe.material.emission.as_dvec3() } else { DVec3::ZERO };
+    let shines = step.first != 0 && (seen.side > 0.0 || lobe.material.flags & TWO_SIDED != 0);
+    let emitted = if shines { lobe.material.emission.as_dvec3() } else { DVec3::ZERO };
     let rays = step.ray_begin..step.ray_begin + step.ray_count;
     let reflected: DVec3 = rays.map(|k| ray(inputs, step, index, surface, &seen, &lobe, k)).sum();
     Contribution::of(emitted + reflected)
@@ -59,24 +61,7 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
         let visible = visibility(inputs, origin, incident.wi, incident.distance);
         return lobe.scattering(incident.wi) * cosine * incident.irradiance * visible;
     }
-    let first_direction = inputs.features.first_direction(inputs.view);
-    if k < first_direction {
-        let (u1, u2) = direction_point(
-            inputs,
-            step,
-            Place::alone(position(inputs.view, step, index)),
-            k - inputs.view.light_count,
-            DIM_EMITTER_REFLECT,
-        );
-        let drawn = emitter::draw(inputs, origin, u1, u2);
-        let cosine = cosine(drawn.wi);
-        if lobe.is_mirror() || cosine <= 0.0 {
-            return DVec3::ZERO;
-        }
-        let light = from_emitter(inputs, origin, &drawn, lobe.direction_pdf(inputs, drawn.wi));
-        return lobe.scattering(drawn.wi) * cosine * light / directions;
-    }
-    let j = k - first_direction;
+    let j = k - inputs.view.light_count;
     if lobe.is_mirror() {
         let wi = 2.0 * lobe.cos_o * lobe.normal - lobe.wo;
         if j > 0 || cosine(wi) <= 0.0 {
@@ -89,14 +74,26 @@ fn ray(inputs: &Inputs, step: &Step, index: u32, surface: &Surface, seen: &Seen,
         };
         return reflectance * arriving;
     }
-    let (u1, u2) = direction_point(inputs, step, Place::alone(position(inputs.view, step, index)), j, DIM_REFLECT);
+    let place = Place::alone(position(inputs.view, step, index));
+    let points = f64::from(inputs.features.emitters);
+    let mut sum = DVec3::ZERO;
+    if inputs.features.emitters != 0 {
+        let (u1, u2) = direction_point(inputs, step, place, j, DIM_EMITTER_REFLECT);
+        let drawn = emitter::draw(inputs, origin, u1, u2);
+        let cosine = cosine(drawn.wi);
+        if cosine > 0.0 {
+            let light = from_emitter(inputs, origin, &drawn, points, lobe.direction_pdf(inputs, drawn.wi));
+            sum += lobe.scattering(drawn.wi) * cosine * light / directions;
+        }
+    }
+    let (u1, u2) = direction_point(inputs, step, place, j, DIM_REFLECT);
     let wi = lobe.direction(inputs, u1, u2);
     let pdf = lobe.direction_pdf(inputs, wi);
     let cosine = cosine(wi);
-    if cosine <= 0.0 || pdf <= 0.0 {
-        return DVec3::ZERO;
+    if cosine > 0.0 && pdf > 0.0 {
+        sum += lobe.scattering(wi) * cosine * from_direction(inputs, origin, wi, points, pdf) / directions;
     }
-    lobe.scattering(wi) * cosine * from_direction(inputs, origin, wi, pdf) / directions
+    sum
 }
 
 fn fresnel_outside(ior: f64, cos: f64) -> f64 {

@@ -52,11 +52,11 @@ use super::random::{batch, key, scramble, unit};
 use super::rough::crossing;
 use super::sums::Contribution;
 use super::texture;
-use super::tile::{Place, direction_point};
+use super::tile::{Place, direction_point, golden};
 use super::{Inputs, emitter, intersect, mixture};
 use crate::shared::{
-    DIM_SINGLE, DIM_SINGLE_EMITTER, DIM_SINGLE_LIGHT, EMITTER_REACH, ENVIRONMENT_IMAGE, MISS, Material, SHADOW_OFFSET,
-    Step, Surface, Triangle,
+    DIM_SINGLE, DIM_SINGLE_EMITTER, DIM_SINGLE_LIGHT, DIM_SINGLE_SOURCE, EMITTER_REACH, ENVIRONMENT_IMAGE, MISS,
+    Material, SHADOW_OFFSET, Step, Surface, Triangle,
 };
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -229,44 +229,34 @@ pub fn single(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Co
         let part = tint(inputs, hit.triangle, hit.barycentric) * flux * DVec3::from([0, 1, 2].map(channel));
         Some((part, lifted(on_triangle(triangle, hit.barycentric), side * outward), along))
     };
-    let first_direction = inputs.features.first_direction(inputs.view);
+    let share = emitter::share(inputs, point);
     let lit = |k: u32| -> Option<DVec3> {
         if let Some(light) = inputs.lights.get(k as usize) {
             let incident = light::delta(light, point);
             let (part, exit, along) = passage(incident.wi, incident.distance, MISS)?;
             return Some(part * incident.irradiance * visibility(inputs, exit, incident.wi, incident.distance - along));
         }
-        if k < first_direction {
-            let (u1, u2) = direction_point(
-                inputs,
-                step,
-                Place::alone(position(inputs.view, step, index)),
-                k - inputs.view.light_count,
-                DIM_SINGLE_EMITTER,
-            );
+        let place = Place::alone(position(inputs.view, step, index));
+        let numbers = |dimension| direction_point(inputs, step, place, k - inputs.view.light_count, dimension);
+        let pdf = |wi| (1.0 - share) * direction_pdf(inputs, &directions, wi);
+        if golden(inputs, step, place, k - inputs.view.light_count, DIM_SINGLE_SOURCE) < share {
+            let (u1, u2) = numbers(DIM_SINGLE_EMITTER);
             let drawn = emitter::draw(inputs, point, u1, u2);
             let reach = drawn.distance * f64::from(EMITTER_REACH);
             let (part, exit, along) = passage(drawn.wi, reach, drawn.triangle)?;
             let hit = intersect::closest(inputs, exit, drawn.wi, 0.0, reach - along);
             let hidden = hit.is_some_and(|hit| hit.triangle != drawn.triangle) || !drawn.density.is_finite();
-            let density = drawn.density + direction_pdf(inputs, &directions, drawn.wi);
+            let density = share * drawn.density + pdf(drawn.wi);
             return (!hidden).then(|| part * drawn.radiance / (density * each));
         }
-        let u = direction_point(
-            inputs,
-            step,
-            Place::alone(position(inputs.view, step, index)),
-            k - first_direction,
-            DIM_SINGLE_LIGHT,
-        );
-        let wi = direction(inputs, &directions, u)?;
-        let pdf = direction_pdf(inputs, &directions, wi);
+        let wi = direction(inputs, &directions, numbers(DIM_SINGLE_LIGHT))?;
+        let pdf = pdf(wi);
         let (part, exit, along) = passage(wi, FAR, MISS)?;
         let radiance = match intersect::closest(inputs, exit, wi, 0.0, FAR) {
             None => light::environment(inputs, wi) / pdf,
             Some(hit) if inputs.features.emitters != 0 => {
                 let emitted = emitter::radiance(inputs, hit.triangle, hit.barycentric, wi);
-                emitted / (emitter::density(inputs, hit.triangle, wi, along + hit.t) + pdf)
+                emitted / (share * emitter::density(inputs, hit.triangle, wi, along + hit.t) + pdf)
             }
             Some(_) => DVec3::ZERO,
         };

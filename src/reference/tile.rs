@@ -17,7 +17,7 @@
 use super::Inputs;
 use super::pixel::position;
 use super::random::{batch, hash, key, scramble, sobol, unit};
-use crate::shared::{BATCHES, DIM_ANGLE, DIM_COMPONENT, DIM_HIT, DIM_PLACE, DIM_TECHNIQUE, Step};
+use crate::shared::{BATCHES, DIM_ANGLE, DIM_COMPONENT, DIM_HIT, DIM_PLACE, DIM_TECHNIQUE, GOLDEN, Step};
 
 /// A pixel's tile, and where in it the pixel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +102,15 @@ pub fn coordinate(inputs: &Inputs, step: &Step, place: Place, dimension: u32) ->
     };
     let second = matches!(dimension, DIM_COMPONENT | DIM_TECHNIQUE);
     unit(own ^ scramble(sobol(at, usize::from(second)), of_place))
+}
+
+/// A number for direction `j` of the step's sample at a place: steps by the golden ratio, which cover [0, 1) evenly in a
+/// tile and in a pixel, from a hash. It has nothing to do with the binary digits of `j`, as [`direction_point`] has.
+pub fn golden(inputs: &Inputs, step: &Step, place: Place, j: u32, dimension: u32) -> f64 {
+    let number = (step.sample_index / BATCHES).wrapping_mul(inputs.view.directions).wrapping_add(j);
+    let start = key(inputs.view.seed, place.tile.0, place.tile.1, batch(step.sample_index), dimension);
+    let n = number.wrapping_mul((place.width * place.width).max(1)).wrapping_add(place.at);
+    unit(start.wrapping_add(GOLDEN.wrapping_mul(n)))
 }
 
 /// Coordinates of direction or emitter's point `j` of the step's sample at a place.

@@ -198,6 +198,10 @@ constants! {
     DIM_SINGLE_EMITTER: u32 = 20;
     /// Dimension of the hash that draws where tabulated profiles of a tile's hits are read.
     DIM_REUSE: u32 = 22;
+    /// Dimension: whether a ray goes to a point of an emitter, for the exit (a number per direction).
+    DIM_SOURCE: u32 = 23;
+    /// Dimension: the same, for single scattering.
+    DIM_SINGLE_SOURCE: u32 = 24;
     /// 2^32 over the golden ratio: the step of numbers that cover [0, 1) evenly.
     GOLDEN: u32 = 0x9e37_79b9;
     /// Added to a dimension for what the place in a tile brings to it.
@@ -316,12 +320,16 @@ structs! {
         crop_width: u32,
         /// Key of all random numbers.
         seed: u32,
-        /// Incoming environment directions at each position, N.
+        /// Incoming directions at each position, N, of the environment and of emitters.
         directions: u32,
         /// Delta lights in the scene.
         light_count: u32,
         /// Triangles that emit light.
         emitter_count: u32,
+        /// Centre of a ball around them.
+        emitters_centre: Vec3,
+        /// Square of its radius.
+        emitters_radius2: f32,
         /// 1 to add the environment where a camera ray hits nothing.
         show_environment: u32,
         /// Tiles: twice the number of sets.
@@ -355,7 +363,7 @@ structs! {
         sample_index: u32,
         /// 1 to trace `primary` through the pixel's centre, for the AOVs.
         pixel_centre: u32,
-        /// First shadow ray of this dispatch: delta lights first, then points of emitters, then directions.
+        /// First shadow ray of this dispatch: delta lights first, then directions.
         ray_begin: u32,
         /// Shadow rays of this dispatch; 0 where the scene has no light.
         ray_count: u32,
@@ -798,16 +806,11 @@ features! {
 }
 
 impl Features {
-    /// Shadow rays of a sample: one for each delta light, N to points of emitters if there are any, and N in directions
-    /// from which an environment or an emitter may shine.
+    /// Shadow rays of a sample: one for each delta light, and N in directions from which an environment or an emitter may
+    /// shine. Where light is reflected, each of the N is two if there are emitters, one of them to a point of these.
     pub fn rays(&self, view: &View) -> u32 {
         let directions = self.environment != ENVIRONMENT_NONE || self.emitters != 0;
-        self.first_direction(view) + u32::from(directions) * view.directions
-    }
-
-    /// The first of those rays that is a direction.
-    pub fn first_direction(&self, view: &View) -> u32 {
-        view.light_count + self.emitters * view.directions
+        view.light_count + u32::from(directions) * view.directions
     }
 }
 

@@ -402,6 +402,7 @@ fn shining(count: u32) -> World {
     }
     world.emitters = emitter::table(&world.triangles, &world.shadings, &world.materials);
     world.view.emitter_count = world.emitters.len() as u32;
+    (world.view.emitters_centre, world.view.emitters_radius2) = emitter::ball(&world.triangles, &world.emitters);
     world.features.emitters = 1;
     // The vectors of the invocations follow; triangles have no need of normals here.
     let materials: Vec<u32> = world.shadings.iter().map(|shading| shading.material).collect();

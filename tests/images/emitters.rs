@@ -208,7 +208,7 @@ fn near_emitters_agree_with_the_integrator() {
             if surrounding > 0.0 {
                 scene.set_environment(Environment::constant(DVec3::splat(surrounding)).expect("valid")).expect("valid");
             }
-            let image = render(&scene, &Settings { resolution: Some((24, 24)), ..settings() }, 256);
+            let image = render(&scene, &Settings { resolution: Some((24, 24)), ..settings() }, 512);
             for (c, letter) in ["R", "G", "B"].into_iter().enumerate() {
                 let values = channel(&image, &format!("subsurface.{letter}"));
                 let (mean, error) = mean_and_error(&values.iter().map(|x| f64::from(*x)).collect::<Vec<_>>());
@@ -238,5 +238,16 @@ fn a_rough_white_furnace_closes() {
         println!("roughness {roughness}, n {ior}, tilt {tilt}: {found:.5} +- {error:.5}");
         assert!((found - 1.0).abs() < 1e-3 + 4.0 * error, "{roughness} {ior} {tilt}: {found} +- {error}");
         assert!(error < 2e-3, "no force: {found} +- {error}");
+    }
+}
+
+#[test]
+fn the_back_of_a_lamp_is_dark() {
+    let eye = Eye { eye: DVec3::Z * 3.0, at: DVec3::ZERO, lens: 1e-2 };
+    for (up, two_sided, radiance) in [(true, false, 2.0), (false, false, 0.0), (false, true, 2.0)] {
+        let file = gltf(&[(disk(0.0, up), 0)], &[lamp(2.0, two_sided)], &[], &eye);
+        let image = render(&scene(&file), &settings(), 4);
+        let seen = channel(&image, "reflection.R");
+        assert!(seen.iter().all(|light| *light == radiance), "{up}, {two_sided}: {seen:?}");
     }
 }

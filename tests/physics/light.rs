@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3, Vec3, dvec3, vec3};
 use std::f64::consts::{PI, TAU};
 use translucent::Normalisation::Energy;
 use translucent::reference::boundary::{fresnel, transmittance};
+use translucent::reference::emitter::{ball, share};
 use translucent::reference::light::*;
 use translucent::reference::math::cosine_direction;
 use translucent::reference::profile::{Dipole, Radial};
@@ -311,4 +312,26 @@ fn emission_and_background_are_added_once() {
     step.ray_count = 0;
     assert_eq!(valid(reflect(&world.inputs(), &step, 0, &surface)), DVec3::ZERO);
     assert_eq!(valid(reflect(&world.inputs(), &step, 0, &miss)), DVec3::ZERO);
+}
+
+#[test]
+fn rays_go_to_emitters_where_these_are_far() {
+    let (mut world, _) = on_plane(PROJECTION_MIS);
+    world.features.environment = ENVIRONMENT_NONE;
+    assert_eq!(share(&world.inputs(), DVec3::ZERO), 0.0);
+    world.features.emitters = 1;
+    let first = world.triangles.len() as u32;
+    let (x, y) = (DVec3::X * 0.6, DVec3::Y * 0.8);
+    let middle = DVec3::Z * 3.0;
+    world.triangle([middle - x, middle + x, middle - y]);
+    world.triangle([middle - x, middle + y, middle + x]);
+    let emitters = [0, 1].map(|k| Emitter { triangle: first + k, ..Default::default() });
+    let (centre, radius2) = ball(&world.triangles, &emitters);
+    assert!(centre.distance(vec3(0.0, 0.0, 3.0)) < 1e-6 && (radius2 - 0.64).abs() < 1e-6, "{centre} {radius2}");
+    (world.view.emitters_centre, world.view.emitters_radius2) = (centre, radius2);
+    let far = share(&world.inputs(), DVec3::ZERO);
+    assert!((far - (1.0 - 0.5 * (0.64f64 / 9.0).powi(2))).abs() < 1e-6, "{far}");
+    assert_eq!(share(&world.inputs(), dvec3(0.3, 0.2, 2.5)), 0.5);
+    world.features.environment = ENVIRONMENT_CONSTANT;
+    assert_eq!(share(&world.inputs(), DVec3::ZERO), 0.5);
 }

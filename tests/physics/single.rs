@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use std::f64::consts::{LN_2, PI, TAU};
 use translucent::reference::{
     boundary::transmittance,
-    emitter::table,
+    emitter::{ball, table},
     light::environment_cdf,
     math::integrate,
     single::{Scattering, phase, refracted, single},
@@ -181,6 +181,7 @@ fn an_emitter_is_a_light() {
         world.materials.push(Material { emission: Vec3::ONE, ..Default::default() });
         let emitters = table(&world.triangles, &world.shadings, &world.materials);
         (world.view.emitter_count, world.features.emitters) = (emitters.len() as u32, 1);
+        (world.view.emitters_centre, world.view.emitters_radius2) = ball(&world.triangles, &emitters);
         world.emitters = emitters;
         // Over the emitter's area, as seen from the plane; the depth of the scattering is nothing beside the distance.
         world.materials[0].extinction *= 1e3;
