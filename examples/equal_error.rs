@@ -4,9 +4,9 @@
 //!
 //!     cargo run --release --example equal_error [SAMPLES OF THE CONVERGED IMAGE [SCENE]]
 //!
-//! Or the most memory that one render takes, start and image included:
+//! Or the most memory that one render takes, start and image included, and how long that is:
 //!
-//!     cargo run --release --example equal_error peak SCENE METHOD SAMPLES
+//!     cargo run --release --example equal_error peak SCENE METHOD SAMPLES [PIXELS OF A BAND]
 
 use glam::{DAffine3, DVec3};
 use std::{collections::HashMap, error::Error, f64::consts::PI, time::Instant};
@@ -261,14 +261,16 @@ fn peak() -> Option<f64> {
 
 fn main() -> Outcome<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if let [mode, scene, method, samples] = &arguments[..]
+    if let [mode, scene, method, samples, band @ ..] = &arguments[..]
         && mode == "peak"
     {
         let (_, settings) = methods().into_iter().find(|(name, _)| name == method).ok_or("no such method")?;
+        let settings = Settings { band_pixels: band.first().map(|text| text.parse()).transpose()?, ..settings };
+        let start = Instant::now();
         // Without the meshes of an application.
         let scene = subject(scene)?.scene()?;
         render(scene, &settings, samples.parse()?)?;
-        println!("{:.0} MB", peak().ok_or("only Linux tells")?);
+        println!("{:.0} MB, {:.1} s", peak().ok_or("only Linux tells")?, start.elapsed().as_secs_f64());
         return Ok(());
     }
     let converged: u32 = arguments.first().map_or(Ok(128), |text| text.parse())?;

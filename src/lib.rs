@@ -65,8 +65,8 @@
 //!
 //! *Bands.* An image with more pixels than [`Settings::band_pixels`] is cut into bands of rows. They take turns on the
 //! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
-//! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups; but where pixels
-//! of a tile share hits ([`Settings::reuse`]) its noise does on bands, whose edges cut tiles.
+//! sample and seed alone, so the image does not depend on bands, batches of submissions or workgroups. Rows of tiles that a
+//! band cuts ([`Settings::reuse`]) are rendered with it; not where the error is estimated: there noise depends on bands.
 //!
 //! *Tiles.* `accumulate` leaves the hit that it lit in Probes, with its light over the weights of the tile's pixels, and
 //! `reuse` adds the tile's hits to each pixel ([`reference::reuse`]). Tiles lie elsewhere in each batch. Around a crop

@@ -362,9 +362,10 @@ pub struct Settings {
     /// `mis` and `normal` miss at most this share of the light. Their other biases are the lift of shadow rays
     /// ([`shared::SHADOW_OFFSET`]) and, for matter that f32 cannot resolve, a mean free path kept within its reach.
     pub radius_tail: f64,
-    /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows. Without it 2^18, or
-    /// what the device's bindings and memory allow. The image does not depend on it, but for noise where a band's edge
-    /// cuts tiles ([`reuse`](Settings::reuse)): with few samples it is seen as a seam.
+    /// Most pixels that the device holds at a time; an image of more is rendered in bands of rows, with the rows beside
+    /// them that [tiles](Settings::reuse) share: of a few rows as many again may come on top. Without it 2^18, or what
+    /// the device's bindings and memory allow. The image does not depend on it; with
+    /// [`estimate_error`](Settings::estimate_error) its noise does where a band's edge cuts tiles.
     pub band_pixels: Option<u32>,
     /// Makes what [`Renderer::record`](crate::Renderer::record) needs: one band, whatever `band_pixels` says, colours
     /// in a buffer of their own, and the count of samples on the device. The image does not depend on it, but for noise at

@@ -199,7 +199,7 @@ fn buffers(inspection: &Inspection) -> String {
     rows.push(row(["  total", &total.to_string(), "", &megabytes(total)]));
     if plan.waiting_bytes() > 0 {
         let waiting = plan.waiting_bytes();
-        let about = format!("{}: sums of the bands that wait, on the host", megabytes(waiting));
+        let about = format!("{}: sums of the bands that wait, on the host, at most", megabytes(waiting));
         rows.push(row(["  waiting", &waiting.to_string(), "", &about]));
     }
     "BUFFERS on the device\n".to_string() + &aligned(&rows)

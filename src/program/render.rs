@@ -59,6 +59,10 @@ pub struct Render {
     /// Exposure of the PNG in stops.
     #[arg(long, value_name = "EV", requires = "png", allow_negative_numbers = true, value_parser = arguments::finite)]
     exposure: Option<f64>,
+    /// Most pixels on the device at a time, 2^18 where memory allows. With fewer a render takes less memory and longer; the
+    /// image is the same, but with --error.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    band_pixels: Option<u32>,
     /// Key of all random numbers.
     #[arg(long, value_name = "S", default_value_t = 0, allow_negative_numbers = true)]
     seed: u32,
@@ -220,6 +224,7 @@ impl Render {
             seed: self.seed,
             variance: self.wants("variance") && self.samples().len() >= BATCHES as usize,
             estimate_error: self.error.is_some(),
+            band_pixels: self.band_pixels,
             ..self.scene.settings()
         }
     }

@@ -13,7 +13,7 @@
 
 use super::{
     PASS, Progress, Renderer, SUBMISSION,
-    bands::{Band, Film},
+    bands::{Band, Film, unpack},
     error,
 };
 use crate::{
@@ -272,14 +272,14 @@ impl Renderer {
     fn estimate(&mut self) -> Result<Estimate> {
         let _span = timeline::begin(&self.settings.timeline, "estimate");
         self.keep()?;
-        let band_sums = |band: &Band| -> Vec<Sums> { bytemuck::pod_collect_to_vec(&band.sums[0]) };
+        let band_sums = |band: &Band| -> Vec<Sums> { bytemuck::pod_collect_to_vec(&unpack(&band.sums[0])) };
         let sums: Vec<Vec<Sums>> = self.bands.iter().map(band_sums).collect();
         let values = 3.0 * sums.iter().map(Vec::len).sum::<usize>() as f64;
         let mean = sums.iter().flatten().map(|sums| error::light(sums).element_sum()).sum::<f64>() / values;
         let k = FLOOR_OF_MEAN * mean * mean;
         let (mut samples, mut own) = (vec![], vec![]);
         for (band, sums) in self.bands.iter().zip(&sums) {
-            let batches: Vec<Vec3> = bytemuck::pod_collect_to_vec(&band.sums[1]);
+            let batches: Vec<Vec3> = bytemuck::pod_collect_to_vec(&unpack(&band.sums[1]));
             samples.extend(sums.iter().map(|sums| sums.samples));
             // Without any light there is no error.
             let part = |(i, sums): (usize, &Sums)| match k > 0.0 {

@@ -1,7 +1,7 @@
 //! The finished image: means and variance from `resolve`, AOVs at the pixels' centres, and what made it. Every value is
 //! finite: what exceeds f32 is its largest number.
 
-use super::{Band, Renderer, own, spirv_hash};
+use super::{Band, Renderer, spirv_hash};
 use crate::{
     error::Result,
     gpu::{Buffer, download_to, give_back_freed},
@@ -40,14 +40,15 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     order.sort_by_key(|band| renderer.resident != Some(*band));
     for band in order {
         renderer.make_resident(band)?;
-        let Band { pixels, first_row, .. } = renderer.bands[band];
-        let first = ((first_row - rows.start) * view.crop_width) as usize;
+        let Band { pixels, first_row, ref own, .. } = renderer.bands[band];
+        let own = own.start as usize..own.end as usize;
+        let first = ((first_row - rows.start) * view.crop_width) as usize + own.start;
         let step =
             Step { first_row, pixel_count: pixels, pixel_centre: 1, range_begin: range.start, ..Step::default() };
         // The G-buffer of batch 0 is overwritten; its stratum is traced anew before the next sample.
         renderer.strata[0] = None;
         let Renderer { recorder, kernels, bindings, .. } = renderer;
-        let recorder = own(recorder)?;
+        let recorder = super::own(recorder)?;
         recorder.begin()?;
         for kernel in [&kernels.resolve, &kernels.primary].into_iter().flatten() {
             recorder.dispatch(kernel, bindings, pixels, &step);
@@ -58,7 +59,7 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
         drop(span);
-        for (index, (pixel, surface)) in (first..).zip(resolved.iter().zip(&surfaces)) {
+        for (index, (pixel, surface)) in (first..).zip(resolved[own.clone()].iter().zip(&surfaces[own])) {
             invalid += u64::from(pixel.invalid);
             total += u64::from(pixel.samples);
             most = most.max(pixel.samples);

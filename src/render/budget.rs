@@ -22,7 +22,7 @@ struct Need {
     remedy: &'static str,
 }
 
-/// Bytes of the sums that a render keeps on the host for these bands.
+/// Bytes of the sums that a render keeps on the host for these bands, before they are packed.
 pub fn waiting_bytes(prepared: &Prepared, bands: impl Iterator<Item = u32>) -> u64 {
     let made = bands::slots(prepared);
     let each: u64 = SUMS
@@ -42,7 +42,7 @@ pub fn check(limits: Limits, scene: &Scene, prepared: &Prepared, bands: &[Band])
     let device: Vec<Need> = plan::sizes(scene, prepared, largest).into_iter().map(of_slot).collect();
     refuse(&device, limits.heap_bytes, "the device's memory", "")?;
 
-    let pixels: u64 = bands.iter().map(|band| u64::from(band.pixels)).sum();
+    let pixels: u64 = bands.iter().map(|band| band.own.len() as u64).sum();
     let image = pixels * assemble::bytes_per_pixel(prepared.features.batches != 0);
     let waiting = waiting_bytes(prepared, bands.iter().map(|band| band.pixels));
     // `finish` frees the sums of a band when its part of the image is there.

@@ -132,8 +132,9 @@ pub struct Renderer {
     /// How often the sums of the band on the device are copied to the host, and when they last were.
     keep_every: Option<Duration>,
     kept_at: Instant,
-    /// Where sums are copied to before they take the place of older ones.
-    spare: [Vec<u8>; 2],
+    /// Where sums are copied to before they are packed. Allocated once: bands that take turns would leave the allocator
+    /// holes that it does not give back.
+    spare: Vec<u8>,
     /// Writing failed midway: the buffers are of two scenes.
     torn: bool,
 }
@@ -302,7 +303,7 @@ impl Renderer {
             warm: false,
             keep_every: None,
             kept_at: Instant::now(),
-            spare: Default::default(),
+            spare: vec![],
             torn: false,
         })
     }
@@ -387,10 +388,10 @@ impl Renderer {
             self.begin = Some(range.start);
             self.bands.iter_mut().for_each(|band| band.end = range.start);
         }
-        let pixels: u64 = self.bands.iter().map(|band| u64::from(band.pixels)).sum();
+        let pixels: u64 = self.bands.iter().map(|band| band.own.len() as u64).sum();
         let total = pixels * u64::from(range.end - range.start);
         let mut state = Progress { done: 0, total, error: None };
-        let early = |band: &Band| u64::from(band.pixels) * u64::from(band.end.min(range.end) - range.start);
+        let early = |band: &Band| band.own.len() as u64 * u64::from(band.end.min(range.end) - range.start);
         state.done += self.bands.iter().map(early).sum::<u64>();
         self.light_points()?;
         let mut stop = false;
@@ -412,7 +413,7 @@ impl Renderer {
                     let end = pass.end.min(next.saturating_add(count));
                     self.submit_samples(band, next..end, None).inspect_err(|_| self.distrust(band))?;
                     self.keep_in_time()?;
-                    state.done += u64::from(self.bands[band].pixels) * u64::from(end - next);
+                    state.done += self.bands[band].own.len() as u64 * u64::from(end - next);
                     next = end;
                     stop |= progress(&state).is_break();
                 }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    gpu::{Buffer, Device, download_to, upload},
+    gpu::{Device, download_to, upload},
     scene::{self, Scene},
     shared::{BATCHES, Slot},
     timeline,
@@ -38,7 +38,7 @@ impl Renderer {
         for (index, slot) in SUMS.into_iter().enumerate() {
             let Some((_, buffer)) = self.buffers.iter().find(|(s, _)| *s == slot) else { continue };
             if on_host {
-                upload(&self.device, buffer, &self.bands[band].sums[index])?;
+                upload(&self.device, buffer, &bands::unpack(&self.bands[band].sums[index]))?;
             } else {
                 recorder.fill(buffer, 0);
             }
@@ -57,18 +57,15 @@ impl Renderer {
         if !*changed && kept.is_some() {
             return Ok(());
         }
-        let buffer = |slot: Slot| find(&self.buffers, slot);
         // A copy that may fail must not take the place of what is there: half new and half old it would be of no use.
-        let direct = SUMS.into_iter().filter_map(buffer).all(Buffer::is_mapped);
-        let copies = if direct { &mut *sums } else { &mut self.spare };
-        for (data, slot) in copies.iter_mut().zip(SUMS) {
-            let Some(buffer) = buffer(slot) else { continue };
-            data.resize(bands::bytes(slot, &self.prepared.features, *pixels) as usize, 0);
-            download_to(&self.device, buffer, data)?;
+        let mut copies: [Vec<u8>; 2] = Default::default();
+        for (copy, slot) in copies.iter_mut().zip(SUMS) {
+            let Some(buffer) = find(&self.buffers, slot) else { continue };
+            self.spare.resize(bands::bytes(slot, &self.prepared.features, *pixels) as usize, 0);
+            download_to(&self.device, buffer, &mut self.spare)?;
+            *copy = bands::pack(&self.spare);
         }
-        if !direct {
-            std::mem::swap(sums, &mut self.spare);
-        }
+        *sums = copies;
         (*kept, *changed) = (Some(*end), false);
         self.kept_at = Instant::now();
         Ok(())

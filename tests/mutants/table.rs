@@ -103,9 +103,9 @@ mutants! {
         "clamp(corner + int(REUSE) - 1, ivec2(0), size)";
     "sample.comp", "lost factor", "kernel.sample": "2u * triangles[surface.triangle].set" => "triangles[surface.triangle].set";
     "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (probes[other].share != share) continue;" => "";
-    "emitter.glsl", "lost factor", "kernel.accumulate": "1.0 - 0.5 * min(ratio * ratio, 1.0)" => "1.0 - min(ratio * ratio, 1.0)";
-    "arriving.glsl", "sign", "kernel.accumulate": "PI / (1.0 - share)" => "PI / (1.0 + share)";
-    "arriving.glsl", "lost factor", "kernel.accumulate": "share * point.density" => "point.density";
+    "emitter.glsl", "lost factor", "kernel.irradiance": "1.0 - 0.5 * min(ratio * ratio, 1.0)" => "1.0 - min(ratio * ratio, 1.0)";
+    "arriving.glsl", "sign", "kernel.irradiance": "PI / (1.0 - share)" => "PI / (1.0 + share)";
+    "arriving.glsl", "lost factor", "kernel.irradiance": "share * point.density" => "point.density";
     "single.comp", "lost factor", "kernel.single": "share * emitter_density" => "emitter_density";
     "shared_hit.glsl", "sign", "kernel.accumulate": "hit - surfaces[surface_index(other)].position" =>
         "hit + surfaces[surface_index(other)].position";

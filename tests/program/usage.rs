@@ -143,6 +143,7 @@ fn the_help_names_every_option_that_is_built_and_no_other() {
         [
             "--albedo-mapping",
             "--aov",
+            "--band-pixels",
             "--cache-points",
             "--cache-samples",
             "--cache-spacing",
