@@ -112,39 +112,40 @@ void main() {
         uint count = hit_lists[index].count;
         if (!(probe.t_min <= probe.t_max) || count == 0u) return;
 
-        // One hit is lit, chosen in proportion to its profile over density (a weighted reservoir). The round after the
-        // last hit is that of the chosen one: a second copy of this code would take as long again to compile.
-        uint kept = min(count, MAX_HITS);
-        float cumulative[MAX_HITS];
+        // One hit is lit, chosen in proportion to its profile over density.
         float total = 0.0;
+        float u = coordinate(place, key, batch, DIM_HIT);
         vec3 f;
         float given = 1.0;
         if (PROJECTION == PROJECTION_CAMERA) shift = m.camera_rate * probe.radius;
-        [[dont_unroll]] for (uint j = 0u; j <= kept; j++) {
-            uint hit = j;
-            if (j == kept) {
-                if (!(total > 0.0)) return;
-                float threshold = coordinate(place, key, batch, DIM_HIT) * total;
-                hit = 0u;
-                for (uint i = 1u; i < kept; i++) {
-                    if (cumulative[i - 1u] <= threshold && cumulative[i] > cumulative[i - 1u]) hit = i;
-                }
-            }
-            delta = probe.offset + hit_lists[index].t[hit] * probe.direction;
-            lit = hit_lists[index].triangle[hit];
-            vec3 n = geometric_normal(triangles[lit]);
-            barycentric = weights(triangles[lit], (s.position - triangles[lit].vertices[0]) + delta);
-            local = entered_matter(m, surface, lit, barycentric);
-            f = local.strength * shape_shifted(local, dot(delta, delta), shift);
-            if (PROJECTION == PROJECTION_CAMERA) given = camera_factor(s, m, probe, delta, n);
-            f *= given;
-            if (j == kept) break;
+        uint j = 0u;
+        [[dont_unroll]] do {
+            vec3 to = probe.offset + hit_lists[index].t[j] * probe.direction;
+            uint triangle = hit_lists[index].triangle[j];
+            vec3 n = geometric_normal(triangles[triangle]);
+            vec2 at = weights(triangles[triangle], (s.position - triangles[triangle].vertices[0]) + to);
+            Material there = entered_matter(m, surface, triangle, at);
+            vec3 value = there.strength * shape_shifted(there, dot(to, to), shift);
+            if (PROJECTION == PROJECTION_CAMERA) given = camera_factor(s, m, probe, to, n);
+            value *= given;
             // In the opaque limit light leaves nowhere else.
-            if (MIXED != 0 && has_model(local, MODEL_LAMBERT)) f = vec3(0.0);
-            float p = PROJECTION == PROJECTION_CAMERA ? 1.0 : hit_density(s, m, surface, delta, n);
-            total += p > 0.0 ? (f.x + f.y + f.z) / p : 0.0;
-            cumulative[j] = total;
-        }
+            if (MIXED != 0 && has_model(there, MODEL_LAMBERT)) value = vec3(0.0);
+            float p = PROJECTION == PROJECTION_CAMERA ? 1.0 : hit_density(s, m, surface, to, n);
+            float weight = p > 0.0 ? (value.x + value.y + value.z) / p : 0.0;
+            total += weight;
+            float chance = total > 0.0 ? weight / total : 0.0;
+            // What is left of the number, of the hit that is chosen so far or of the others, is one in [0, 1) again.
+            bool chosen = u < chance;
+            u = chosen ? u / chance : (u - chance) / (1.0 - chance);
+            if (chosen) {
+                delta = to;
+                lit = triangle;
+                barycentric = at;
+                f = value;
+            }
+        } while (++j < min(count, MAX_HITS));
+        if (!(total > 0.0)) return;
+        local = entered_matter(m, surface, lit, barycentric);
         own_value = has_model(local, MODEL_DIRECTIONAL);
         // f / p x total / (sum(f) / p): the density cancels. The directional dipole's own value comes with each ray.
         float weight = total * max(1.0, float(count) / float(MAX_HITS));
@@ -159,7 +160,8 @@ void main() {
     float entry_share = roughness_share(lit, barycentric);
 
     vec3 entering = cached ? cached_light(local, lit, barycentric) : vec3(0.0);
-    for (uint k = step_.ray_begin; !cached && k < step_.ray_begin + step_.ray_count; k++) {
+    uint k = step_.ray_begin;
+    if (!cached) do {
         vec3 direction;
         vec3 light = arriving(view, k, position, n, shading_n, place, key, batch,
             sample_index() / BATCHES, direction);
@@ -169,7 +171,7 @@ void main() {
             if (own_value) light *= directed(local, s, delta, shading_n, direction, shift);
             entering += light;
         }
-    }
+    } while (++k < step_.ray_begin + step_.ray_count);
 
     if (REUSE != 0u && !has_model(m, MODEL_LAMBERT)) {
         if (has_texture(TEXTURE_BASE_COLOR)) entering *= texture_value(TEXTURE_BASE_COLOR, lit, barycentric).rgb;

@@ -31,7 +31,8 @@ void main() {
     Place place = Place(uvec2(index, POINTS_ROW - step_.first_row), 0u);
     uint key = pixel_key(view.seed, place.tile);
     vec3 flux = vec3(0.0), oblique = vec3(0.0);
-    for (uint k = step_.ray_begin; k < step_.ray_begin + step_.ray_count; k++) {
+    uint k = step_.ray_begin;
+    if (step_.ray_count != 0u) do {
         vec3 direction;
         vec3 light = arriving(view, k, point.position, point.normal, shading_n, place, key,
             sample_index() % BATCHES, sample_index() / BATCHES, direction);
@@ -43,7 +44,7 @@ void main() {
             flux += light;
             oblique += light * table_oblique(m, c);
         }
-    }
+    } while (++k < step_.ray_begin + step_.ray_count);
     vec3 tint = vec3(point.area);
     // Between points pixels bring their own.
     if (IRRADIANCE != IRRADIANCE_CACHED && has_texture(TEXTURE_BASE_COLOR)) {

@@ -75,7 +75,8 @@ vec3 table_vector(Material m, uint node, uint at) {
 vec3 table_between(Material m, float r2, bool density) {
     vec3 sum = vec3(0.0);
     float weight = table_weight;
-    [[dont_unroll]] for (uint k = 0u; k < (CURVATURE != 0 ? 2u : 1u); k++) {
+    uint k = 0u;
+    [[dont_unroll]] do {
         // Either may be 0: of a flat place the first, beyond the last node the second, which is none.
         if (weight > 0.0) {
             float area;
@@ -84,7 +85,7 @@ vec3 table_between(Material m, float r2, bool density) {
             sum += density ? value * table_vector(m, table_node + k, 2u) : value;
         }
         weight = 1.0 - table_weight;
-    }
+    } while (++k < (CURVATURE != 0 ? 2u : 1u));
     return sum;
 }
 

@@ -87,9 +87,9 @@ float mixture_density(Seen s, Material m, vec3 delta, vec3 n) {
         jacobians.w = cos_plane > 0.0 ? abs(dot(n, d)) / cos_plane * q * q : 0.0;
     }
     float p = 0.0;
-    uint first = REPROJECT == REPROJECT_SCREEN ? TECHNIQUE_CAMERA : TECHNIQUE_NORMAL;
-    [[dont_unroll]] for (uint k = first; k < (PROJECTION == PROJECTION_MIS ? 4u : 1u); k++) {
+    uint k = REPROJECT == REPROJECT_SCREEN ? TECHNIQUE_CAMERA : TECHNIQUE_NORMAL;
+    [[dont_unroll]] do {
         p += fractions[k] * radial_density(m, r2[k]) * jacobians[k];
-    }
+    } while (++k < (PROJECTION == PROJECTION_MIS ? 4u : 1u));
     return p;
 }

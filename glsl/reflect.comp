@@ -72,13 +72,11 @@ void main() {
         uint key = pixel_key(view.seed, pixel_position(view, index));
         uint next = step_.ray_begin;
         bool to_emitter = false;
-        while (next < step_.ray_begin + step_.ray_count) {
+        if (step_.ray_count != 0u) do {
             // Where there are emitters, a ray to a point of theirs goes before that in each direction.
             uint k = next;
             to_emitter = EMISSIVE != 0 && k >= view.light_count && !mirror && !to_emitter;
             if (!to_emitter) next++;
-            // A mirror has one direction.
-            if (mirror && k != view.light_count) continue;
             vec3 direction;
             float distance = 1e30;
             vec3 light = vec3(0.0);
@@ -119,7 +117,8 @@ void main() {
             vec3 weight = vec3(0.0);
             float density = 0.0;
             if (mirror) {
-                weight = vec3(fresnel(m.ior, wo.z));
+                // One direction is all.
+                weight = vec3(k == view.light_count ? fresnel(m.ior, wo.z) : 0.0);
                 light *= weight;
             } else if (open) {
                 weight = reflected(m, translucent, alpha, wo, wi);
@@ -150,7 +149,7 @@ void main() {
                 if (direction_ray || found == point.triangle) hit_count = 0u;
             }
             if (open && hit_count == 0u) radiance += light;
-        }
+        } while (next < step_.ray_begin + step_.ray_count);
         if (step_.first != 0 && (s.side > 0.0 || (m.flags & TWO_SIDED) != 0)) radiance += m.emission;
     }
     add_reflection(index, radiance);

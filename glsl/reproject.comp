@@ -44,8 +44,9 @@ void main() {
         hit_triangle[j] = triangle;
     }
     hit_lists[index].count = hit_count;
-    for (uint i = 0; i < kept; i++) {
+    uint i = 0u;
+    if (kept != 0u) do {
         hit_lists[index].t[i] = hit_t[i];
         hit_lists[index].triangle[i] = hit_triangle[i];
-    }
+    } while (++i < kept);
 }

@@ -39,18 +39,17 @@ void main() {
     float reach2 = probes[index].reach2;
     vec3 sum = vec3(0.0);
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
-    [[dont_unroll]] for (uint y = tile.first.y; y < tile.end.y; y++) {
-        [[dont_unroll]] for (uint x = tile.first.x; x < tile.end.x; x++) {
-            uint other = y * view.crop_width + x;
-            turn += GOLDEN;
-            if (probes[other].share != share) continue;
-            vec3 light = probes[other].light;
-            if (light == vec3(0.0)) continue;
+    uint other = tile.first.y * view.crop_width + tile.first.x, column = tile.first.x;
+    [[dont_unroll]] do {
+        turn += GOLDEN;
+        vec3 light = probes[other].light;
+        if (probes[other].share == share && light != vec3(0.0)) {
             vec3 delta = probes[other].hit - surface.position;
             float r2 = other == index ? probes[index].hit_r2 : dot(delta, delta);
             if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));
         }
-    }
+        next_member(tile, view.crop_width, other, column);
+    } while (other < tile.end.y * view.crop_width);
 
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     float cos_eye = dot(s.shading_normal, s.wo);

@@ -20,10 +20,9 @@ float tile_weight(Material m, float r2) {
 float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float hit_r2) {
     float own = 0.0, sum = 0.0;
     uint share = probes[index].share;
-    [[dont_unroll]] for (uint y = tile.first.y; y < tile.end.y; y++) {
-        [[dont_unroll]] for (uint x = tile.first.x; x < tile.end.x; x++) {
-            uint other = y * width + x;
-            if (probes[other].share != share) continue;
+    uint other = tile.first.y * width + tile.first.x, column = tile.first.x;
+    [[dont_unroll]] do {
+        if (probes[other].share == share) {
             vec3 delta = hit - surfaces[surface_index(other)].position;
             // Its own hits count as in reach.
             float r2 = other == index ? hit_r2 : dot(delta, delta);
@@ -31,6 +30,7 @@ float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float 
             if (other == index) own = weight;
             if (other == index || r2 <= probes[other].reach2) sum += weight;
         }
-    }
+        next_member(tile, width, other, column);
+    } while (other < tile.end.y * width);
     return own / sum;
 }

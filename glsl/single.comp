@@ -101,7 +101,8 @@ void main() {
     vec3 radiance = vec3(0.0);
     // The first ray goes along the camera ray to the other side of the matter; then two to each light, one to the surface
     // and one from there.
-    for (uint trace = 0; trace <= 2u * step_.ray_count; trace++) {
+    uint trace = 0u;
+    do {
         bool to_surface = trace % 2u == 1u;
         uint k = step_.ray_begin + (max(trace, 1u) - 1u) / 2u;
         bool wanted = max(part.x, max(part.y, part.z)) > 0.0;
@@ -207,6 +208,6 @@ void main() {
             }
             if (seen_light) radiance += light * part;
         }
-    }
+    } while (++trace <= 2u * step_.ray_count);
     add_subsurface(index, leaving * radiance);
 }

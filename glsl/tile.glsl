@@ -31,6 +31,15 @@ Tile tile_of(View view, Place place, uint batch) {
     return Tile(uvec2(max(corner, ivec2(0))), uvec2(clamp(corner + int(REUSE), ivec2(0), size)));
 }
 
+// The next pixel of a tile's part of the band, row by row.
+void next_member(Tile tile, uint width, inout uint index, inout uint column) {
+    index++;
+    if (++column == tile.end.x) {
+        column = tile.first.x;
+        index += width - (tile.end.x - tile.first.x);
+    }
+}
+
 // The sample's first Probe::share.
 uint first_share(View view) {
     return (sample_index() + 1u) * view.groups;

@@ -229,14 +229,20 @@ pub fn choose(
             if p > 0.0 { (value / p, (f / p).element_sum()) } else { (DVec3::ZERO, 0.0) }
         })
         .collect();
-    let total: f64 = terms.iter().map(|(_, w)| w).sum();
-    let threshold = coordinate(inputs, step, Place::of(inputs, step, index), DIM_HIT) * total;
-    let mut sum = 0.0;
-    let chosen = terms.iter().position(|(_, w)| {
-        sum += w;
-        threshold < sum
-    });
-    let chosen = chosen.or_else(|| terms.iter().rposition(|(_, w)| *w > 0.0))?;
+    // One after the other: hit j takes the place of those before it with probability w_j / (w_1 + ... + w_j). What is left
+    // of the number in [0, 1), of the share that it fell into, is one again (M. T. Chao, Biometrika 69 (1982)).
+    let mut u = coordinate(inputs, step, Place::of(inputs, step, index), DIM_HIT);
+    let (mut total, mut chosen) = (0.0, None);
+    for (j, (_, w)) in terms.iter().enumerate() {
+        total += w;
+        let chance = if total > 0.0 { w / total } else { 0.0 };
+        if u < chance {
+            (chosen, u) = (Some(j), u / chance);
+        } else {
+            u = (u - chance) / (1.0 - chance);
+        }
+    }
+    let chosen = chosen?;
     let (value, weight) = terms[chosen];
     let lost = (f64::from(hits.count) / f64::from(MAX_HITS)).max(1.0);
     Some((chosen, value * (total / weight) * lost))

@@ -202,7 +202,8 @@ fn tiled() -> Result<Vec<Case>> {
         // What the table sees is not shared with what the ball sees beside it.
         materials[1] = matter([2.0, 3.0, 4.0], [0.3, 0.2, 0.1], 1.3);
         let scene = still_life(&materials, light)?;
-        cases.push(Case::new(name, scene, &Settings { model, reuse, ..settings(seed) })?);
+        // Many hits are near where some of a tile's pixels no longer reach.
+        cases.push(Case::new(name, scene, &Settings { model, reuse, radius_tail: 0.09, ..settings(seed) })?);
     }
     Ok(cases)
 }
@@ -234,7 +235,7 @@ fn looked_up() -> Result<Vec<Case>> {
 pub(super) fn kept() -> Result<Vec<Case>> {
     let list = [
         ("table, kept light, delta lights", Model::Table, Light::Delta, 1),
-        ("burley, kept light, tiles of 4, emitters outside", Model::Burley, Light::EmittersOutside, 4),
+        ("burley, kept light, tiles of 4, emitters", Model::Burley, Light::Emitters, 4),
     ];
     let mut cases = vec![];
     for (seed, (name, model, light, reuse)) in (37..).zip(list) {
@@ -266,7 +267,7 @@ pub(super) fn kept() -> Result<Vec<Case>> {
 pub fn clouds() -> Result<Vec<Case>> {
     let list = [
         ("cloud, standard, delta lights", Model::Standard, Light::Delta, 0.0),
-        ("cloud, burley, emitters", Model::Burley, Light::Emitters, 0.5),
+        ("cloud, burley, emitters outside", Model::Burley, Light::EmittersOutside, 0.5),
         ("cloud, table, image", Model::Table, Light::Image, 0.0),
     ];
     let mut cases = vec![];
