@@ -118,8 +118,7 @@ void main() {
         vec3 f;
         float given = 1.0;
         if (PROJECTION == PROJECTION_CAMERA) shift = m.camera_rate * probe.radius;
-        uint j = 0u;
-        [[dont_unroll]] do {
+        [[dont_unroll]] for (uint j = 0u; j < min(count, MAX_HITS); j++) {
             vec3 to = probe.offset + hit_lists[index].t[j] * probe.direction;
             uint triangle = hit_lists[index].triangle[j];
             vec3 n = geometric_normal(triangles[triangle]);
@@ -143,7 +142,7 @@ void main() {
                 barycentric = at;
                 f = value;
             }
-        } while (++j < min(count, MAX_HITS));
+        }
         if (!(total > 0.0)) return;
         local = entered_matter(m, surface, lit, barycentric);
         own_value = has_model(local, MODEL_DIRECTIONAL);

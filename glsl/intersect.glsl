@@ -103,8 +103,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
     uvec2 nodes_left = uvec2(0u, 0x80000000u);
     uint steps = 0;
     bool done = !(ray.t_min <= t_max);
-    // Loops that test at their end: on lavapipe a body whose lanes are all done takes as long as any other.
-    if (!done) do {
+    while (!done) {
         steps++;
         uvec2 triangles_left = uvec2(0u);
         if (nodes_left.y > 0x00ffffffu) {
@@ -128,7 +127,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
             nodes_left = uvec2(b.x, (mask & 0xff000000u) | (a.w >> 24));
             triangles_left = uvec2(b.y, mask & 0x00ffffffu);
         }
-        if (triangles_left.y != 0u) do {
+        while (triangles_left.y != 0u) {
             steps++;
             uint bit = uint(findLSB(triangles_left.y));
             triangles_left.y &= triangles_left.y - 1u;
@@ -164,7 +163,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
                 hit_barycentric = barycentric;
                 if (mode == ANY) break;
             }
-        } while (triangles_left.y != 0u);
+        }
         if (mode == ANY && hit_count != 0u) break;
         if (nodes_left.y <= 0x00ffffffu) {
             if (stack_size == 0u)
@@ -172,7 +171,7 @@ void traverse(Ray ray, uint mode, uint set, uint key) {
             else
                 nodes_left = stack[--stack_size];
         }
-    } while (!done);
+    }
     // Once for each ray that has a segment: `bench` counts how often.
     if (COUNT_STEPS != 0 && steps != 0u) atomicMax(counters[0], steps);
 }

@@ -72,7 +72,7 @@ void main() {
         uint key = pixel_key(view.seed, pixel_position(view, index));
         uint next = step_.ray_begin;
         bool to_emitter = false;
-        if (step_.ray_count != 0u) do {
+        while (next < step_.ray_begin + step_.ray_count) {
             // Where there are emitters, a ray to a point of theirs goes before that in each direction.
             uint k = next;
             to_emitter = EMISSIVE != 0 && k >= view.light_count && !mirror && !to_emitter;
@@ -149,7 +149,7 @@ void main() {
                 if (direction_ray || found == point.triangle) hit_count = 0u;
             }
             if (open && hit_count == 0u) radiance += light;
-        } while (next < step_.ray_begin + step_.ray_count);
+        }
         if (step_.first != 0 && (s.side > 0.0 || (m.flags & TWO_SIDED) != 0)) radiance += m.emission;
     }
     add_reflection(index, radiance);

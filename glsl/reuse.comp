@@ -39,17 +39,20 @@ void main() {
     float reach2 = probes[index].reach2;
     vec3 sum = vec3(0.0);
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
-    uint other = tile.first.y * view.crop_width + tile.first.x, column = tile.first.x;
+    uint n = 0u;
+    Member member = first_member(tile, view.crop_width);
     [[dont_unroll]] do {
-        turn += GOLDEN;
+        bool there = in_band(tile, member);
+        uint other = there ? member.index : index;
+        turn += there ? GOLDEN : 0u;
         vec3 light = probes[other].light;
-        if (probes[other].share == share && light != vec3(0.0)) {
+        if (there && probes[other].share == share && light != vec3(0.0)) {
             vec3 delta = probes[other].hit - surface.position;
             float r2 = other == index ? probes[index].hit_r2 : dot(delta, delta);
             if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));
         }
-        next_member(tile, view.crop_width, other, column);
-    } while (other < tile.end.y * view.crop_width);
+        next_member(tile, view.crop_width, member);
+    } while (++n < REUSE * REUSE);
 
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     float cos_eye = dot(s.shading_normal, s.wo);

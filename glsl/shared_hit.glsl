@@ -20,9 +20,12 @@ float tile_weight(Material m, float r2) {
 float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float hit_r2) {
     float own = 0.0, sum = 0.0;
     uint share = probes[index].share;
-    uint other = tile.first.y * width + tile.first.x, column = tile.first.x;
+    uint n = 0u;
+    Member member = first_member(tile, width);
     [[dont_unroll]] do {
-        if (probes[other].share == share) {
+        bool there = in_band(tile, member);
+        uint other = there ? member.index : index;
+        if (there && probes[other].share == share) {
             vec3 delta = hit - surfaces[surface_index(other)].position;
             // Its own hits count as in reach.
             float r2 = other == index ? hit_r2 : dot(delta, delta);
@@ -30,7 +33,7 @@ float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float 
             if (other == index) own = weight;
             if (other == index || r2 <= probes[other].reach2) sum += weight;
         }
-        next_member(tile, width, other, column);
-    } while (other < tile.end.y * width);
+        next_member(tile, width, member);
+    } while (++n < REUSE * REUSE);
     return own / sum;
 }

@@ -31,13 +31,24 @@ Tile tile_of(View view, Place place, uint batch) {
     return Tile(uvec2(max(corner, ivec2(0))), uvec2(clamp(corner + int(REUSE), ivec2(0), size)));
 }
 
-// The next pixel of a tile's part of the band, row by row.
-void next_member(Tile tile, uint width, inout uint index, inout uint column) {
-    index++;
-    if (++column == tile.end.x) {
-        column = tile.first.x;
-        index += width - (tile.end.x - tile.first.x);
-    }
+// Goes through the places of a tile, row by row; `index` is that in the band.
+struct Member {
+    uint index;
+    uvec2 at;
+};
+
+Member first_member(Tile tile, uint width) {
+    return Member(tile.first.y * width + tile.first.x, tile.first);
+}
+
+void next_member(Tile tile, uint width, inout Member member) {
+    bool row = member.at.x == tile.first.x + REUSE - 1u;
+    member.index += row ? width - (REUSE - 1u) : 1u;
+    member.at = row ? uvec2(tile.first.x, member.at.y + 1u) : uvec2(member.at.x + 1u, member.at.y);
+}
+
+bool in_band(Tile tile, Member member) {
+    return member.at.x < tile.end.x && member.at.y < tile.end.y;
 }
 
 // The sample's first Probe::share.
