@@ -65,7 +65,8 @@
 //!
 //! *Loops.* On lavapipe 22.3.6 a loop that tests at its head runs its body once more when no lane is left, which takes as
 //! long as any round. One that tests at its end does not; but what it leaves to a lane that ended before others is not
-//! what that lane had. So where all lanes do as many rounds the test is at the end, elsewhere at the head.
+//! what that lane had. So where all lanes do as many rounds, or nothing is read after them,
+//! the test is at the end, elsewhere at the head.
 //!
 //! *Bands.* An image with more pixels than [`Settings::band_pixels`] is cut into bands of rows. They take turns on the
 //! device, 32 samples at a time; meanwhile the sums of the others wait on the host. Random numbers depend on pixel,
