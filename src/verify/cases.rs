@@ -113,7 +113,7 @@ pub fn cases() -> Result<Vec<Case>> {
     use Projection::{Camera, Mis, Normal};
     let list = [
         ("standard, mis, delta lights", Model::Standard, Mis, Light::Delta),
-        ("standard, camera, uniform light", Model::Standard, Camera, Light::Constant),
+        ("standard, camera, emitters outside", Model::Standard, Camera, Light::EmittersOutside),
         ("better, normal, image", Model::Better, Normal, Light::Image),
         ("burley, mis, emitters", Model::Burley, Mis, Light::Emitters),
         ("directional, mis, delta lights", Model::Directional, Mis, Light::Delta),
