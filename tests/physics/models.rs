@@ -172,6 +172,18 @@ fn an_authors_albedo_is_the_better_dipoles_total() {
 }
 
 #[test]
+fn wide_channels_are_drawn_more_often() {
+    let profiles = channels(dvec3(1.0, 4.0, 1e3), DVec3::ZERO, 1.4).map(|channel| Profile::new(MODEL_BURLEY, &channel));
+    // Lengths of 1, 1/4 and 1/1000; a quarter is dealt out equally.
+    let expected = [1.0, 0.25, 0.001].map(|length: f64| 1.0 / 12.0 + 0.75 * length / 1.251);
+    let found = chances(&profiles);
+    assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?} for {expected:?}");
+    let black = channels(dvec3(1.0, 0.0, 2.0), DVec3::ONE, 1.4).map(|channel| Profile::new(MODEL_STANDARD, &channel));
+    let found = chances(&black);
+    assert!(found[1] == 0.0 && found[0] > found[2] && (found.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{found:?}");
+}
+
+#[test]
 fn samplers_follow_the_profiles() {
     // Kolmogorov and Smirnov at 1e-6 as in `profile`, over all three channels of one material.
     let count = 20_000u32;
@@ -185,7 +197,9 @@ fn samplers_follow_the_profiles() {
         let mut radii: Vec<f64> =
             (0..count).map(|i| draw_radius((&material).into(), number(2 * i), number(2 * i + 1))).collect();
         radii.sort_by(f64::total_cmp);
-        let expected = |r: f64| profiles.iter().map(|p| p.inside(r) / p.mass() / 3.0).sum::<f64>();
+        let chances = chances(&profiles);
+        let expected =
+            |r: f64| profiles.iter().zip(chances).map(|(p, chance)| chance * p.inside(r) / p.mass()).sum::<f64>();
         let worst = radii.iter().enumerate().map(|(i, &r)| {
             let f = expected(r);
             (f - i as f64 / f64::from(count)).abs().max((f - (i + 1) as f64 / f64::from(count)).abs())

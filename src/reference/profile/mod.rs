@@ -303,6 +303,10 @@ pub fn draw_radius(matter: Matter, u_component: f64, u_radius: f64) -> f64 {
     Profile::unpack(matter, component / COMPONENTS).radius(component % COMPONENTS, share, u_radius)
 }
 
+/// Of an equal share, what each channel's probability is at least: bounds the variance of any channel at four times that of
+/// equal shares.
+pub const LEAST_CHANNEL: f64 = 0.25;
+
 /// What the kernels' constants depend on besides the matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -322,10 +326,23 @@ impl Options {
     }
 }
 
+/// Probabilities with which radii are drawn from the channels' profiles: in proportion to the radius that nine tenths of a
+/// channel's light stay within, since light from afar is what is found least, and at least [`LEAST_CHANNEL`] of an equal
+/// share. 0 for a channel that does not scatter.
+pub fn chances(channels: &[Profile; 3]) -> [f64; 3] {
+    let widths = channels.each_ref().map(|c| if c.strength() > 0.0 { c.radius_beyond(0.1) } else { 0.0 });
+    let equal = 1.0 / channels.iter().filter(|c| c.strength() > 0.0).count().max(1) as f64;
+    let sum: f64 = widths.iter().sum();
+    [0, 1, 2].map(|c| match channels[c].strength() > 0.0 {
+        true => LEAST_CHANNEL * equal + (1.0 - LEAST_CHANNEL) * widths[c] / sum,
+        false => 0.0,
+    })
+}
+
 /// The BSSRDF part of a material as kernels read it; the rest is zero, for the caller to fill. `model` is one of MODEL_*.
 ///
-/// Coefficients in 1/internal unit. Channels that scatter are equally probable; within one, a component is as probable
-/// as its part of the mass.
+/// Coefficients in 1/internal unit. Channels have their [`chances`]; within one, a component is as probable as its part of
+/// the mass.
 pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> shared::Material {
     if model == MODEL_LAMBERT {
         return lambert::limit(MODEL_STANDARD, matter, options);
@@ -333,12 +350,12 @@ pub fn material(model: u32, matter: &[Coefficients; 3], options: Options) -> sha
     let ior = matter[0].ior;
     let channels = matter.each_ref().map(|matter| Profile::new(model, matter));
     let scattering = || channels.iter().filter(|c| c.strength() > 0.0);
-    let probability = 1.0 / scattering().count().max(1) as f64;
+    let chances = chances(&channels);
     let leaving = options.leaving(matter[0].diffuse_reflectance(Side::Outside));
 
     let mut material = Material { model, ior: ior as f32, flags: TRANSLUCENT, ..Material::default() };
     let mut cumulative = 0.0;
-    for (c, channel) in channels.iter().enumerate() {
+    for (c, (channel, probability)) in channels.iter().zip(chances).enumerate() {
         channel.pack(c, &options, &mut material);
         if channel.strength() == 0.0 {
             continue;
