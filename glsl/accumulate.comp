@@ -179,7 +179,8 @@ void main() {
         probes[index].hit = position;
         probes[index].hit_r2 = r2;
         factor *= tile_share(tile_of(view, place, batch), view.crop_width, m, index, position, r2);
-        probes[index].light += entering * factor;
+        vec3 light = uintBitsToFloat(probes[index].lit.xyz) + entering * factor;
+        probes[index].lit.xyz = floatBitsToUint(light);
         return;
     }
 

@@ -3,7 +3,10 @@
 vec3 burley_shape(Material m, float r2, float shift) {
     float r = max(sqrt(r2), BURLEY_RADIUS_MIN);
     vec3 x = m.sigma_tr * r;
-    return (exp_(shift - x) + exp_(shift - x * (1.0 / 3.0))) * (m.sigma_tr / r) * (0.125 / PI);
+    vec3 wide = exp_(shift - x * (1.0 / 3.0));
+    // Without a shift the narrow exponential is the wide one's cube.
+    vec3 narrow = shift == 0.0 ? wide * wide * wide : exp_(shift - x);
+    return (narrow + wide) * (m.sigma_tr / r) * (0.125 / PI);
 }
 
 float burley_radius(Material m, float u_component, float u_radius) {

@@ -11,7 +11,7 @@ vec2 table_bend = vec2(0.0);
 float table_scale = 0.0;
 
 uint table_base(Material m, uint node) {
-    return m.table + node * (TABLE_HEADER + 6u * (m.table_cells + 1u));
+    return m.table + node * (TABLE_HEADER + 2u * (m.table_cells + 1u));
 }
 
 // Chooses the curvatures at the surface that is seen.
@@ -25,15 +25,15 @@ void table_at(Material m, Surface surface) {
     float curvature = dot(balances[m.balance + surface.triangle].curvature, vec3(1.0 - b.x - b.y, b));
     table_scale = 0.25 * curvature * curvature;
     uint above = 0u;
-    while (above < min(m.table_nodes, TABLE_NODES) && profiles[table_base(m, above)] > curvature) above++;
+    while (above < min(m.table_nodes, TABLE_NODES) && profiles[table_base(m, above)].x > curvature) above++;
     if (above == m.table_nodes) return;
-    float low = profiles[table_base(m, above)];
+    float low = profiles[table_base(m, above)].x;
     if (above == 0u) {
         table_node = 0u;
         if (low > 0.0) table_bend = vec2(low / curvature - 1.0);
         return;
     }
-    float high = profiles[table_base(m, above - 1u)];
+    float high = profiles[table_base(m, above - 1u)].x;
     table_node = above - 1u;
     table_weight = (curvature - low) / (high - low);
     if (low > 0.0) table_bend = vec2(high, low) / curvature - 1.0;
@@ -55,20 +55,14 @@ vec3 table_value(Material m, uint node, float r2) {
     uint cell = floatBitsToUint(r2) >> TABLE_SHIFT;
     uint nodes = m.table_cells + 1u;
     bool before = cell < m.table_first;
-    if (!before && cell - m.table_first >= uint(profiles[base + 1u])) return vec3(0.0);
+    if (!before && cell - m.table_first >= uint(profiles[base].y)) return vec3(0.0);
     float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
     float t = (r2 - low) / (high - low);
     // Before the first cell the light within it counts; a branch would read both on a device whose lanes take all.
     uint i = base + TABLE_HEADER + (before ? nodes : cell - m.table_first);
-    vec3 a = vec3(profiles[i], profiles[i + 2u * nodes], profiles[i + 4u * nodes]);
-    i += before ? 0u : 1u;
-    vec3 b = vec3(profiles[i], profiles[i + 2u * nodes], profiles[i + 4u * nodes]);
+    vec3 a = profiles[i];
+    vec3 b = profiles[i + (before ? 0u : 1u)];
     return before ? a / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT)) : mix(a, b, t);
-}
-
-vec3 table_vector(Material m, uint node, uint at) {
-    uint i = table_base(m, node) + at;
-    return vec3(profiles[i], profiles[i + 1u], profiles[i + 2u]);
 }
 
 // Values between the two curvatures. Those of a density are divided by their masses.
@@ -82,7 +76,7 @@ vec3 table_between(Material m, float r2, bool density) {
             float area;
             float bent = table_bent(r2, table_bend[k], area);
             vec3 value = weight * area * table_value(m, table_node + k, bent);
-            sum += density ? value * table_vector(m, table_node + k, 2u) : value;
+            sum += density ? value * profiles[table_base(m, table_node + k) + 1u] : value;
         }
         weight = 1.0 - table_weight;
     } while (++k < (CURVATURE != 0 ? 2u : 1u));
@@ -118,7 +112,7 @@ void table_draw(Material m, float u) {
     uint second = CURVATURE != 0 && u >= table_weight ? 1u : 0u;
     uint base = table_base(m, table_node + second);
     table_values = base + TABLE_HEADER;
-    table_reached = uint(profiles[base + 1u]);
+    table_reached = uint(profiles[base].y);
     table_drawn_bend = table_bend[second];
 }
 
@@ -133,7 +127,7 @@ vec3 table_drawn(Material m, float r2, float u) {
     if (!before && i >= table_reached) return vec3(0.0);
     uint nodes = m.table_cells + 1u;
     uint at = table_values + (before ? nodes : i + (u * (high - low) < bent - low ? 1u : 0u));
-    vec3 value = area * vec3(profiles[at], profiles[at + 2u * nodes], profiles[at + 4u * nodes]);
+    vec3 value = area * profiles[at];
     return before ? value / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT)) : value;
 }
 
@@ -141,7 +135,7 @@ vec3 table_drawn(Material m, float r2, float u) {
 float table_reach2(Material m) {
     float reach = 0.0;
     [[dont_unroll]] for (uint k = 0u; k < (CURVATURE != 0 && table_weight < 1.0 ? 2u : 1u); k++) {
-        uint reached = uint(profiles[table_base(m, table_node + k) + 1u]);
+        uint reached = uint(profiles[table_base(m, table_node + k)].y);
         reach = max(reach, table_unbent(uintBitsToFloat((m.table_first + reached) << TABLE_SHIFT), table_bend[k]));
     }
     return reach * reach;
@@ -151,8 +145,8 @@ float table_reach2(Material m) {
 float table_weighed(Material m, float r2) {
     uint cell = clamp(floatBitsToUint(r2) >> TABLE_SHIFT, m.table_first, m.table_first + m.table_cells - 1u);
     float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
-    uint i = table_base(m, m.table_nodes) + cell - m.table_first;
-    return mix(profiles[i], profiles[i + 1u], clamp((r2 - low) / (high - low), 0.0, 1.0));
+    vec3 ends = profiles[table_base(m, m.table_nodes) + cell - m.table_first];
+    return mix(ends.x, ends.y, clamp((r2 - low) / (high - low), 0.0, 1.0));
 }
 
 // Radius with that density.
@@ -163,23 +157,24 @@ float table_radius(Material m, float u_component, float u) {
     bool second = CURVATURE != 0 && table_weight < 1.0 && share >= table_weight;
     uint base = table_base(m, table_node + (second ? 1u : 0u));
     uint nodes = m.table_cells + 1u;
-    uint values = base + TABLE_HEADER + 2u * c * nodes;
+    uint values = base + TABLE_HEADER;
     uint within = values + nodes;
-    uint low = 0u, high = uint(profiles[base + 1u]);
-    float target = u * profiles[within + high];
+    uint low = 0u, high = uint(profiles[base].y);
+    float target = u * profiles[within + high][c];
     float bend = second ? table_bend.y : table_bend.x;
-    if (target < profiles[within]) {
-        return table_unbent(uintBitsToFloat(m.table_first << TABLE_SHIFT) * (target / profiles[within]), bend);
+    float inner = profiles[within][c];
+    if (target < inner) {
+        return table_unbent(uintBitsToFloat(m.table_first << TABLE_SHIFT) * (target / inner), bend);
     }
     for (uint k = 0u; k < TABLE_HALVINGS && high - low > 1u; k++) {
         uint middle = (low + high) / 2u;
-        if (profiles[within + middle] <= target) low = middle;
+        if (profiles[within + middle][c] <= target) low = middle;
         else high = middle;
     }
     float s0 = uintBitsToFloat((m.table_first + low) << TABLE_SHIFT);
     float width = uintBitsToFloat((m.table_first + low + 1u) << TABLE_SHIFT) - s0;
-    float a = profiles[values + low], b = profiles[values + low + 1u];
-    float q = (target - profiles[within + low]) / (PI * width);
+    float a = profiles[values + low][c], b = profiles[values + low + 1u][c];
+    float q = (target - profiles[within + low][c]) / (PI * width);
     float root = a + sqrt(max(a * a + 2.0 * (b - a) * q, 0.0));
     float t = root > 0.0 ? min(2.0 * q / root, 1.0) : 0.0;
     return table_unbent(s0 + t * width, bend);
@@ -187,8 +182,8 @@ float table_radius(Material m, float u_component, float u) {
 
 // Slope of the total in 1 - cosine of refraction.
 vec3 table_slope(Material m) {
-    vec3 slope = table_weight * table_vector(m, table_node, 5u);
-    if (CURVATURE != 0 && table_weight < 1.0) slope += (1.0 - table_weight) * table_vector(m, table_node + 1u, 5u);
+    vec3 slope = table_weight * profiles[table_base(m, table_node) + 2u];
+    if (CURVATURE != 0 && table_weight < 1.0) slope += (1.0 - table_weight) * profiles[table_base(m, table_node + 1u) + 2u];
     return slope;
 }
 

@@ -22,7 +22,7 @@ void main() {
     uint index = active_pixel();
     if (index >= step_.pixel_count) return;
     View view = views[0];
-    uint share = probes[index].share;
+    uint share = probes[index].lit.w;
     if (share - first_share(view) >= view.groups) return;
 
     Surface surface = surfaces[surface_index(index)];
@@ -36,7 +36,7 @@ void main() {
         table_draw(m, unit(hash(key)));
     }
     uint turn = hash(key + 1u);
-    float reach2 = probes[index].reach2;
+    float reach2 = uintBitsToFloat(probes[index].seat.w);
     vec3 sum = vec3(0.0);
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
     uint n = 0u;
@@ -45,8 +45,9 @@ void main() {
         bool there = in_band(tile, member);
         uint other = there ? member.index : index;
         turn += there ? GOLDEN : 0u;
-        vec3 light = probes[other].light;
-        if (there && probes[other].share == share && light != vec3(0.0)) {
+        uvec4 lit = probes[other].lit;
+        vec3 light = uintBitsToFloat(lit.xyz);
+        if (there && lit.w == share && light != vec3(0.0)) {
             vec3 delta = probes[other].hit - surface.position;
             float r2 = other == index ? probes[index].hit_r2 : dot(delta, delta);
             if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));

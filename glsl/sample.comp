@@ -15,30 +15,26 @@ SHADINGS(readonly);
 SURFACES(readonly);
 PROBES(writeonly);
 
-void main() {
-    uint index = active_pixel();
-    if (index >= step_.pixel_count) return;
+Probe drawn(uint index) {
     Probe probe;
     probe.offset = vec3(0.0);
     probe.direction = vec3(0.0);
     probe.t_min = 1.0;
     probe.t_max = 0.0;
     probe.radius = 0.0;
-    probe.share = 0u;
-    probe.reach2 = 0.0;
+    probe.seat = uvec4(0u);
     probe.table_node = 0u;
     probe.table_weight = 1.0;
     probe.table_bend = vec2(0.0);
     probe.table_scale = 0.0;
     probe.hit = vec3(0.0);
     probe.hit_r2 = 0.0;
-    probe.light = vec3(0.0);
-    probes[index] = probe;
+    probe.lit = uvec4(0u);
     Surface surface = surfaces[surface_index(index)];
-    if (surface.triangle == MISS) return;
+    if (surface.triangle == MISS) return probe;
     Shading shading = shadings[surface.triangle];
     Material m = materials[shading.material];
-    if ((m.flags & TRANSLUCENT) == 0) return;
+    if ((m.flags & TRANSLUCENT) == 0) return probe;
 
     View view = views[0];
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
@@ -49,22 +45,23 @@ void main() {
     for (uint i = 0; i < 4; i++) u[i] = coordinate(place, key, batch, i);
     if (MIXED != 0) {
         Mixture mixture = mixture_at(surface);
-        if (mixture.count == 0u) return;
+        if (mixture.count == 0u) return probe;
         m = mixture_member(mixture, pick_member(mixture, u[DIM_COMPONENT]), surface);
     } else {
-        if (m.component_cdf[8] == 0.0) return;
+        if (m.component_cdf[8] == 0.0) return probe;
         if (has_model(m, MODEL_TABLE)) table_at(m, surface);
     }
     if (REUSE != 0u) {
-        probe.share = first_share(view) + 2u * triangles[surface.triangle].set + (s.side < 0.0 ? 1u : 0u);
-        probe.reach2 = m.radius_max * m.radius_max;
+        probe.lit.w = first_share(view) + 2u * triangles[surface.triangle].set + (s.side < 0.0 ? 1u : 0u);
+        float reach2 = m.radius_max * m.radius_max;
         if (has_model(m, MODEL_TABLE)) {
-            probe.reach2 = min(probe.reach2, table_reach2(m));
+            reach2 = min(reach2, table_reach2(m));
             probe.table_node = table_node;
             probe.table_weight = table_weight;
             probe.table_bend = table_bend;
             probe.table_scale = table_scale;
         }
+        probe.seat = floatBitsToUint(vec4(surface.position, reach2));
     }
 
     vec4 fractions = technique_fractions(dot(s.wo, s.normal));
@@ -111,5 +108,10 @@ void main() {
             probe.t_max = -b + half_chord;
         }
     }
-    probes[index] = probe;
+    return probe;
+}
+
+void main() {
+    uint index = active_pixel();
+    if (index < step_.pixel_count) probes[index] = drawn(index);
 }

@@ -92,7 +92,7 @@ const uint MODEL_LAMBERT = 5u;
 // Bits of an f32 below those that number a cell of a tabulated profile.
 const uint TABLE_SHIFT = 21u;
 // Numbers before a table's values at each curvature.
-const uint TABLE_HEADER = 8u;
+const uint TABLE_HEADER = 3u;
 // Most halvings in the search of a distribution function, for at most 500 cells.
 const uint TABLE_HALVINGS = 9u;
 // Most curvatures of a table.
@@ -660,21 +660,22 @@ struct Probe {
     float t_max;
     // Camera projection only: radius in the tangent plane.
     float radius;
-    // Tiles only: (1 + sample) x View::groups + 2 x the set, and 1 more where its inner side is seen. Pixels that have
-    // the same share hits, also without a probe; 0 for none.
-    uint share;
-    // Tiles only: squared distance beyond which the pixel's profile, or the ball of its probes, ends.
-    float reach2;
+    // Tiles only. Bits of xo, and of the squared distance beyond which the pixel's profile, or the ball of its probes,
+    // ends.
+    uvec4 seat;
     // Tabulated profile at the surface that is seen: the first of two curvatures, its weight, how distances bend for
     // both, and 1/4a^2.
     uint table_node;
     float table_weight;
     vec2 table_bend;
     float table_scale;
-    // Written by `accumulate`: the hit that is lit, its squared distance from xo, and its light over the tile's weights.
+    // Written by `accumulate`: the hit that is lit, and its squared distance from xo.
     vec3 hit;
     float hit_r2;
-    vec3 light;
+    // Tiles only. Bits of the hit's light over the tile's weights, which `accumulate` writes; and (1 + sample) x
+    // View::groups + 2 x the set, and 1 more where its inner side is seen: pixels that have the same share hits, also
+    // without a probe; 0 for none.
+    uvec4 lit;
 };
 
 // Where a probe meets surfaces of its set, written by `reproject`.
@@ -754,7 +755,7 @@ struct Pixel {
 // Coordinates of each triangle.
 #define COORDINATES(access) layout(set = 0, binding = 19, scalar) access buffer CoordinatesBlock { Coordinates coordinates[]; }
 // Tabulated profiles of the materials that have them; see `table::block`.
-#define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { float profiles[]; }
+#define PROFILES(access) layout(set = 0, binding = 20, scalar) access buffer ProfilesBlock { vec3 profiles[]; }
 // Where the light of each triangle is kept, then of patches of triangles.
 #define LATTICES(access) layout(set = 0, binding = 21, scalar) access buffer LatticesBlock { Lattice lattices[]; }
 // Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.

@@ -12,26 +12,27 @@ void table_of(Probe probe) {
 // G: about the profile of light that enters at a squared distance, the same for all pixels that share the hit.
 float tile_weight(Material m, float r2) {
     if (has_model(m, MODEL_TABLE)) return table_weighed(m, r2);
-    vec3 value = m.strength * shape(m, r2);
-    return value.x + value.y + value.z;
+    float r = sqrt(r2);
+    return exp_(-m.camera_rate * r) / (r + (BURLEY_RADIUS_MIN + (m.z_real.x + m.z_real.y + m.z_real.z) * (1.0 / 3.0)));
 }
 
 // Of the hit of pixel `index` its weight over that of all pixels of the tile that may find it.
 float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float hit_r2) {
     float own = 0.0, sum = 0.0;
-    uint share = probes[index].share;
+    uint share = probes[index].lit.w;
     uint n = 0u;
     Member member = first_member(tile, width);
     [[dont_unroll]] do {
         bool there = in_band(tile, member);
         uint other = there ? member.index : index;
-        if (there && probes[other].share == share) {
-            vec3 delta = hit - surfaces[surface_index(other)].position;
+        if (there && probes[other].lit.w == share) {
+            vec4 seat = uintBitsToFloat(probes[other].seat);
+            vec3 delta = hit - seat.xyz;
             // Its own hits count as in reach.
             float r2 = other == index ? hit_r2 : dot(delta, delta);
             float weight = tile_weight(m, r2);
             if (other == index) own = weight;
-            if (other == index || r2 <= probes[other].reach2) sum += weight;
+            if (other == index || r2 <= seat.w) sum += weight;
         }
         next_member(tile, width, member);
     } while (++n < REUSE * REUSE);

@@ -41,7 +41,7 @@ pub struct Prepared {
     pub texels: Vec<u32>,
     pub textures: Vec<Texture>,
     /// Tabulated profiles, none without the table model.
-    pub profiles: Vec<f32>,
+    pub profiles: Vec<Vec3>,
     /// Balances of profiles and triangles, none where no profile depends on curvatures.
     pub balances: Vec<Balance>,
     /// Media of each set, none where no set holds several materials.

@@ -12,7 +12,7 @@ use crate::reference::walk::shape::Site;
 use crate::settings::{Model, Normalisation};
 use crate::shared::{self, MODEL_LAMBERT, MODEL_TABLE};
 use crate::table::SPHERES;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// Directions from which a locally alike sphere is measured.
@@ -66,7 +66,7 @@ impl Transfer for Beam {
 /// The tabulated profile, by its kernels' twin.
 struct Table {
     material: shared::Material,
-    numbers: Vec<f32>,
+    numbers: Vec<Vec3>,
     strength: f64,
     /// 1 / radius at each place; empty for half-spaces.
     curvatures: Vec<f64>,

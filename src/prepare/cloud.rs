@@ -38,7 +38,7 @@ pub(super) fn clusters(
     scene: &Scene,
     settings: &Settings,
     materials: &mut [Material],
-    profiles: &[f32],
+    profiles: &[Vec3],
     thickness: &[Vec3],
 ) -> Result<Vec<Cluster>> {
     let Cloud { points, opening, samples } = settings.cloud;
@@ -247,7 +247,7 @@ fn even_out(tree: &Tree, reach: f64, points: &mut [Cluster]) {
 }
 
 /// Sets areas and near masses of a set's points.
-fn weigh(scene: &Scene, material: &Material, profiles: &[f32], thickness: &[Vec3], points: &mut [Cluster]) {
+fn weigh(scene: &Scene, material: &Material, profiles: &[Vec3], thickness: &[Vec3], points: &mut [Cluster]) {
     let Some(set) = points.first().map(|point| point.set) else { return };
     let own = scene.triangles.iter().filter(|triangle| triangle.set == set);
     let corners: Vec<Corners> = own.map(curvature::corners).collect();

@@ -21,7 +21,7 @@ use glam::{DVec3, Vec3};
 /// What the materials of a scene become; the fields are those of [`Prepared`].
 pub(super) struct Matter {
     pub materials: Vec<Material>,
-    pub profiles: Vec<f32>,
+    pub profiles: Vec<Vec3>,
     pub boundaries: Vec<f32>,
     /// [`Features::rough`](shared::Features::rough).
     pub rough_rows: u32,
@@ -104,7 +104,7 @@ fn materials(
     settings: &Settings,
     advice: &[Option<Advice>],
     thickness: &[Vec3],
-    profiles: &mut Vec<f32>,
+    profiles: &mut Vec<Vec3>,
     boundaries: &mut Boundaries,
 ) -> Result<Vec<Material>> {
     let mixed = scene.sets.iter().any(sets::is_mixed);
@@ -213,7 +213,7 @@ fn material(
     material: &scene::Material,
     choice: Option<Choice>,
     Common { frame, settings, thickness, mixed }: Common,
-    profiles: &mut Vec<f32>,
+    profiles: &mut Vec<Vec3>,
     boundaries: &mut Boundaries,
 ) -> Result<Material> {
     let alpha = material.roughness * material.roughness;

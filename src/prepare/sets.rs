@@ -78,7 +78,7 @@ pub(super) fn thickness(scene: &Scene, settings: &Settings, advice: &[Option<Adv
 pub(super) fn balances(
     scene: &Scene,
     materials: &mut [Material],
-    profiles: &[f32],
+    profiles: &[Vec3],
     thickness: &[Vec3],
 ) -> Vec<Balance> {
     if thickness.is_empty() {

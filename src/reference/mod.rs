@@ -70,7 +70,7 @@ pub struct Inputs<'a> {
     pub textures: &'a [Texture],
     pub coordinates: &'a [Coordinates],
     /// Tabulated profiles of the materials.
-    pub profiles: &'a [f32],
+    pub profiles: &'a [Vec3],
     /// Balances of profiles and triangles, one of each triangle or several; empty where no profile depends on curvatures.
     pub balances: &'a [Balance],
     /// Media of each set; empty where none holds several materials.

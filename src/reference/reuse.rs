@@ -39,7 +39,7 @@ use super::shared_hit::{reach, sharing, tile_share};
 use super::sums::Contribution;
 use super::tile::{Place, first_share, members};
 use crate::shared::{BATCHES, DIM_REUSE, GOLDEN, Hits, MODEL_LAMBERT, Probe, Step, Surface};
-use glam::DVec3;
+use glam::{DVec3, UVec4};
 
 /// What the pixels of a band see and probe in a sample.
 #[derive(Clone, Copy, Debug)]
@@ -70,13 +70,14 @@ impl Lit {
     pub fn into_probe(self, probe: &mut Probe) {
         probe.hit = self.position.as_vec3();
         probe.hit_r2 = (self.distance * self.distance) as f32;
-        probe.light = self.light.as_vec3();
+        let [x, y, z] = self.light.as_vec3().to_array().map(f32::to_bits);
+        probe.lit = UVec4::new(x, y, z, probe.lit.w);
     }
 }
 
 /// Whether pixel `index` shares hits in the step's sample.
 fn takes_part(inputs: &Inputs, step: &Step, stage: &Stage, index: u32) -> bool {
-    let share = stage.probes[index as usize].share;
+    let share = stage.probes[index as usize].share();
     share.wrapping_sub(first_share(inputs, step)) < inputs.view.groups
 }
 
@@ -123,12 +124,13 @@ pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage) -> Contrib
         if !sharing.contains(&other) {
             return DVec3::ZERO;
         }
-        let Probe { hit, hit_r2, light, .. } = stage.probes[other as usize];
+        let probe = &stage.probes[other as usize];
+        let Probe { hit, hit_r2, .. } = *probe;
         let own = other == index;
         let r = if own { f64::from(hit_r2).sqrt() } else { hit.as_dvec3().distance(stage.position(index)) };
         let reached = own || r <= reach(matter);
         let u = unit(first.wrapping_add(GOLDEN.wrapping_mul(n)));
-        if reached { light.as_dvec3() * shapes_drawn(matter, r, node, u) } else { DVec3::ZERO }
+        if reached { probe.light().as_dvec3() * shapes_drawn(matter, r, node, u) } else { DVec3::ZERO }
     };
     let members = members(inputs, step, Place::of(inputs, step, index));
     let sum: DVec3 = (1..).zip(members).map(of).sum();

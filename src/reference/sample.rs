@@ -26,15 +26,14 @@ pub const NONE: Probe = Probe {
     t_min: 1.0,
     t_max: 0.0,
     radius: 0.0,
-    share: 0,
-    reach2: 0.0,
+    seat: glam::UVec4::ZERO,
     table_node: 0,
     table_weight: 1.0,
     table_bend: glam::Vec2::ZERO,
     table_scale: 0.0,
     hit: glam::Vec3::ZERO,
     hit_r2: 0.0,
-    light: glam::Vec3::ZERO,
+    lit: glam::UVec4::ZERO,
 };
 
 /// The probe of pixel `index` of the band, whose first surface is `surface`.
@@ -75,8 +74,9 @@ pub fn sample(inputs: &Inputs, step: &Step, index: u32, surface: &Surface) -> Pr
     let mut none = NONE;
     if inputs.features.reuse != 0 {
         let inside = u32::from(seen.side < 0.0);
-        none.share = first_share(inputs, step) + 2 * inputs.triangles[surface.triangle as usize].set + inside;
-        none.reach2 = reach(matter).powi(2) as f32;
+        none.lit.w = first_share(inputs, step) + 2 * inputs.triangles[surface.triangle as usize].set + inside;
+        let [x, y, z] = surface.position.to_array().map(f32::to_bits);
+        none.seat = glam::UVec4::new(x, y, z, (reach(matter).powi(2) as f32).to_bits());
         if matter.material.model == MODEL_TABLE {
             let placement = profile::table::placement(matter);
             (none.table_node, none.table_weight) = (placement.node, placement.weight as f32);

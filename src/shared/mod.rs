@@ -108,7 +108,7 @@ constants! {
     /// Bits of an f32 below those that number a cell of a tabulated profile.
     TABLE_SHIFT: u32 = 21;
     /// Numbers before a table's values at each curvature.
-    TABLE_HEADER: u32 = 8;
+    TABLE_HEADER: u32 = 3;
     /// Most halvings in the search of a distribution function, for at most 500 cells.
     TABLE_HALVINGS: u32 = 9;
     /// Most curvatures of a table.
@@ -652,21 +652,22 @@ structs! {
         t_max: f32,
         /// Camera projection only: radius in the tangent plane.
         radius: f32,
-        /// Tiles only: (1 + sample) x View::groups + 2 x the set, and 1 more where its inner side is seen. Pixels that have
-        /// the same share hits, also without a probe; 0 for none.
-        share: u32,
-        /// Tiles only: squared distance beyond which the pixel's profile, or the ball of its probes, ends.
-        reach2: f32,
+        /// Tiles only. Bits of xo, and of the squared distance beyond which the pixel's profile, or the ball of its probes,
+        /// ends.
+        seat: UVec4,
         /// Tabulated profile at the surface that is seen: the first of two curvatures, its weight, how distances bend for
         /// both, and 1/4a^2.
         table_node: u32,
         table_weight: f32,
         table_bend: Vec2,
         table_scale: f32,
-        /// Written by `accumulate`: the hit that is lit, its squared distance from xo, and its light over the tile's weights.
+        /// Written by `accumulate`: the hit that is lit, and its squared distance from xo.
         hit: Vec3,
         hit_r2: f32,
-        light: Vec3,
+        /// Tiles only. Bits of the hit's light over the tile's weights, which `accumulate` writes; and (1 + sample) x
+        /// View::groups + 2 x the set, and 1 more where its inner side is seen: pixels that have the same share hits, also
+        /// without a probe; 0 for none.
+        lit: UVec4,
     }
 
     /// Where a probe meets surfaces of its set, written by `reproject`.
@@ -748,7 +749,7 @@ buffers! {
     /// Coordinates of each triangle.
     Coordinates = 19: COORDINATES [Coordinates] coordinates;
     /// Tabulated profiles of the materials that have them; see `table::block`.
-    Profiles = 20: PROFILES [f32] profiles;
+    Profiles = 20: PROFILES [Vec3] profiles;
     /// Where the light of each triangle is kept, then of patches of triangles.
     Lattices = 21: LATTICES [Lattice] lattices;
     /// Rows of BOUNDARY_ROW numbers, ROUGH of them for each rough boundary.
@@ -811,6 +812,28 @@ impl Features {
     pub fn rays(&self, view: &View) -> u32 {
         let directions = self.environment != ENVIRONMENT_NONE || self.emitters != 0;
         view.light_count + u32::from(directions) * view.directions
+    }
+}
+
+impl Probe {
+    /// Where the pixel's surface is.
+    pub fn position(&self) -> Vec3 {
+        Vec3::from_array([self.seat.x, self.seat.y, self.seat.z].map(f32::from_bits))
+    }
+
+    /// Squared distance beyond which hits of others are none of its own.
+    pub fn reach2(&self) -> f32 {
+        f32::from_bits(self.seat.w)
+    }
+
+    /// The light that its hit brings to its tile.
+    pub fn light(&self) -> Vec3 {
+        Vec3::from_array([self.lit.x, self.lit.y, self.lit.z].map(f32::from_bits))
+    }
+
+    /// The number that pixels have in common that share their hits; 0 for none.
+    pub fn share(&self) -> u32 {
+        self.lit.w
     }
 }
 

@@ -7,18 +7,19 @@
 //! are those for which each pair of cells holds the light of the simulation's profile.
 //!
 //! # Layout
-//! Node by node of the curvature: 1/a, the number of cells that the sphere reaches, 1 / mass of each channel, slope of the
-//! total in 1 - mu' of each channel; then for each channel the values at the nodes of the grid and the light within them.
-//! A profile is divided by the total of the half-space, which is in the material's strength. After the last curvature, the
-//! half-space's values at the nodes, not divided, summed over channels: what tiles weigh hits by.
+//! All are vectors, mostly of the three channels: a device without a gather instruction takes as long for one as for a number.
+//! Node by node of the curvature: (1/a, the number of cells that the sphere reaches, 0), 1 / mass, slope of the total in
+//! 1 - mu'; then the values at the nodes of the grid, and the light within them.
+//! A profile is divided by the total of the half-space, which is in the material's strength. After the last curvature comes
+//! what tiles weigh hits by: for each cell the half-space's values at its two nodes, not divided, summed over channels.
 
 use super::grid;
 use super::white::{Profile, White};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Numbers before the values of a curvature.
+/// Vectors before the values of a curvature.
 pub const HEADER: usize = crate::shared::TABLE_HEADER as usize;
 /// Light that may lie beyond the table.
 const BEYOND: f64 = 1e-6;
@@ -51,8 +52,8 @@ pub struct Block {
     /// Totals of the half-space.
     pub totals: DVec3,
     pub nodes: u32,
-    /// The numbers, in the order of the layout.
-    pub data: Vec<f32>,
+    /// The vectors, in the order of the layout.
+    pub data: Vec<Vec3>,
 }
 
 /// One channel on one sphere.
@@ -87,34 +88,31 @@ impl Block {
         }
         block.push(0.0, cells, &plane);
         let sum = |i: usize| plane.iter().flatten().map(|column| column.values[i]).sum::<f64>() as f32;
-        block.data.extend((0..=cells as usize).map(sum));
+        block.data.extend((0..cells as usize).map(|i| Vec3::new(sum(i), sum(i + 1), 0.0)));
         block
     }
 
-    /// Numbers of one curvature.
+    /// Vectors of one curvature.
     pub fn stride(cells: u32) -> usize {
-        HEADER + 6 * (cells as usize + 1)
+        HEADER + 2 * (cells as usize + 1)
     }
 
-    /// Numbers of a block.
+    /// Vectors of a block.
     pub fn size(nodes: u32, cells: u32) -> usize {
-        nodes as usize * Block::stride(cells) + cells as usize + 1
+        nodes as usize * Block::stride(cells) + cells as usize
     }
 
     fn push(&mut self, curvature: f64, reached: u32, columns: &[Option<Column>; 3]) {
-        let (data, totals) = (&mut self.data, self.totals);
-        let channel = |c: usize| columns[c].as_ref().map(|column| (column, totals[c]));
-        data.extend([curvature as f32, reached as f32]);
-        data.extend((0..3).map(|c| channel(c).map_or(0.0, |(column, total)| (total / column.total) as f32)));
-        data.extend((0..3).map(|c| channel(c).map_or(0.0, |(column, _)| column.slope as f32)));
-        for c in 0..3 {
-            match channel(c) {
-                None => data.resize(data.len() + 2 * (self.cells as usize + 1), 0.0),
-                Some((column, total)) => {
-                    data.extend(column.values.iter().chain(&column.within).map(|x| (x / total) as f32));
-                }
-            }
-        }
+        let vector = |of: &dyn Fn(&Column, f64) -> f64| {
+            let channel = |c: usize| columns[c].as_ref().map_or(0.0, |column| of(column, self.totals[c]) as f32);
+            Vec3::new(channel(0), channel(1), channel(2))
+        };
+        let nodes = || 0..=self.cells as usize;
+        let mut data = vec![Vec3::new(curvature as f32, reached as f32, 0.0)];
+        data.extend([vector(&|column, total| total / column.total), vector(&|column, _| column.slope)]);
+        data.extend(nodes().map(|i| vector(&|column, total| column.values[i] / total)));
+        data.extend(nodes().map(|i| vector(&|column, total| column.within[i] / total)));
+        self.data.append(&mut data);
     }
 
     /// One channel on a sphere that reaches a number of cells.

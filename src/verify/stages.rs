@@ -21,7 +21,7 @@ use crate::{
     },
     shared::*,
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec4, Vec3, Vec4Swizzles};
 use rayon::prelude::*;
 
 /// Samples from different batches and strata, for cases by turns.
@@ -228,7 +228,7 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         let name = &staged.case.name;
         let surfaces = staged.g_buffers();
         // What an earlier sample may have left.
-        let stale = Probe { t_max: 2.0, share: 7, light: Vec3::ONE, ..Probe::default() };
+        let stale = Probe { t_max: 2.0, lit: UVec4::new(1.0f32.to_bits(), 0, 0, 7), ..Probe::default() };
         let probes = vec![stale; staged.probes.len()];
         let buffers: [(Slot, &[u8]); 2] =
             [(Slot::Surfaces, bytemuck::cast_slice(&surfaces)), (Slot::Probes, bytemuck::cast_slice(&probes))];
@@ -237,9 +237,10 @@ pub fn sample(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         for (i, (found, twin)) in found.iter().zip(&staged.probes).enumerate() {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
             let exists = |p: &Probe| p.t_min <= p.t_max;
-            verdict.words(found.share, twin.share, || at("share"));
-            verdict.compare(found.reach2, twin.reach2.into(), twin.reach2.into(), || at("reach"));
-            verdict.require(found.light == Vec3::ZERO, || at("light"));
+            verdict.words(found.share(), twin.share(), || at("share"));
+            verdict.compare(found.reach2(), twin.reach2().into(), twin.reach2().into(), || at("reach"));
+            verdict.require(found.seat.xyz() == twin.seat.xyz(), || at("seat"));
+            verdict.require(found.light() == Vec3::ZERO, || at("light"));
             verdict.words(found.table_node, twin.table_node, || at("node"));
             verdict.compare(found.table_weight, twin.table_weight.into(), 1.0, || at("weight"));
             let bend = twin.table_bend.as_dvec2().extend(twin.table_scale.into());
@@ -353,12 +354,12 @@ pub fn accumulate(context: &mut Context, staged: &[Staged]) -> Result<Verdict> {
         }
         for (i, (found, twin)) in probes.iter().zip(&staged.lit).enumerate() {
             let at = |what: &str| format!("{name}, pixel {i}, {what}");
-            verdict.words(u32::from(found.light != Vec3::ZERO), twin.is_some().into(), || at("lit"));
+            verdict.words(u32::from(found.light() != Vec3::ZERO), twin.is_some().into(), || at("lit"));
             if let Some(Lit { position, distance, light }) = twin {
                 lit += 1;
                 verdict.vector(found.hit, *position, position.length().max(1.0), || at("place"));
                 verdict.compare(found.hit_r2, distance.powi(2), distance.powi(2), || at("distance"));
-                verdict.vector(found.light, *light, light.length(), || at("light"));
+                verdict.vector(found.light(), *light, light.length(), || at("light"));
             }
         }
     }

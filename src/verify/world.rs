@@ -19,7 +19,7 @@ pub struct World {
     pub texels: Vec<u32>,
     pub textures: Vec<Texture>,
     pub coordinates: Vec<Coordinates>,
-    pub profiles: Vec<f32>,
+    pub profiles: Vec<Vec3>,
     pub balances: Vec<Balance>,
     pub mixtures: Vec<Mixture>,
 }

@@ -102,20 +102,19 @@ mutants! {
     "tile.glsl", "off by one", "kernel.accumulate": "clamp(corner + int(REUSE), ivec2(0), size)" =>
         "clamp(corner + int(REUSE) - 1, ivec2(0), size)";
     "sample.comp", "lost factor", "kernel.sample": "2u * triangles[surface.triangle].set" => "triangles[surface.triangle].set";
-    "shared_hit.glsl", "lost condition", "kernel.accumulate": "there && probes[other].share == share" => "there";
+    "shared_hit.glsl", "lost condition", "kernel.accumulate": "there && probes[other].lit.w == share" => "there";
     "emitter.glsl", "lost factor", "kernel.irradiance": "1.0 - 0.5 * min(ratio * ratio, 1.0)" => "1.0 - min(ratio * ratio, 1.0)";
     "arriving.glsl", "sign", "kernel.irradiance": "PI / (1.0 - share)" => "PI / (1.0 + share)";
     "arriving.glsl", "lost factor", "kernel.irradiance": "share * point.density" => "point.density";
     "single.comp", "lost factor", "kernel.single": "share * emitter_density" => "emitter_density";
-    "shared_hit.glsl", "sign", "kernel.accumulate": "hit - surfaces[surface_index(other)].position" =>
-        "hit + surfaces[surface_index(other)].position";
-    "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (other == index || r2 <= probes[other].reach2) sum" => "sum";
-    "sample.comp", "lost term", "kernel.sample": "probe.light = vec3(0.0);" => "";
+    "shared_hit.glsl", "sign", "kernel.accumulate": "hit - seat.xyz" => "hit + seat.xyz";
+    "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (other == index || r2 <= seat.w) sum" => "sum";
+    "sample.comp", "lost term", "kernel.sample": "probe.lit = uvec4(0u);" => "";
     "reuse.comp", "index", "kernel.reuse": "probes[other].hit - surface.position" => "probes[index].hit - surface.position";
     "profile_table.glsl", "swapped branch", "kernel.reuse": "u * (high - low) < bent - low ? 1u : 0u" =>
         "u * (high - low) < bent - low ? 0u : 1u";
     "profile_table.glsl", "lost condition", "kernel.reuse": "CURVATURE != 0 && u >= table_weight ? 1u : 0u" => "0u";
-    "reuse.comp", "lost condition", "kernel.reuse": "there && probes[other].share == share && " => "there && ";
+    "reuse.comp", "lost condition", "kernel.reuse": "there && lit.w == share && " => "there && ";
     "tile.glsl", "off by one", "kernel.accumulate": "member.at.x < tile.end.x" => "member.at.x <= tile.end.x";
     "accumulate.comp", "comparison", "kernel.accumulate": "u < chance" => "u > chance";
     "profile_table.glsl", "off by one", "kernel.accumulate": "table_base(m, m.table_nodes) + cell" => "table_base(m, m.table_nodes) + 1u + cell";

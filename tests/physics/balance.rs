@@ -13,7 +13,7 @@ const LENGTH: f64 = 1.5;
 
 struct Profiles {
     material: Material,
-    tables: Vec<f32>,
+    tables: Vec<Vec3>,
 }
 
 impl Profiles {

@@ -40,7 +40,7 @@ use crate::shared::{
     RECIPROCAL, TRANSLUCENT,
 };
 use crate::table::{block::Block, white::mean_obliqueness};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use std::ops::Deref;
 
@@ -242,7 +242,7 @@ models! {
 pub struct Matter<'a> {
     pub material: &'a Material,
     /// Tabulated profiles of all materials.
-    pub tables: &'a [f32],
+    pub tables: &'a [Vec3],
     /// 1 over the radius of the sphere that the body resembles at xo; 0 for a half-space.
     pub curvature: f64,
 }
@@ -388,7 +388,7 @@ pub fn tabulated(
     matter: &[Coefficients; 3],
     options: Options,
     spheres: &[i32],
-    tables: &mut Vec<f32>,
+    tables: &mut Vec<Vec3>,
 ) -> shared::Material {
     let mut out = material(MODEL_TABLE, matter, options);
     let block = Block::new(&matter.each_ref().map(crate::table::channel), spheres);

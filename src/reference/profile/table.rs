@@ -22,27 +22,19 @@ use crate::table::{
     block::{Block, HEADER},
     grid,
 };
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// The profile of one channel on a half-space.
 #[derive(Clone, Debug)]
 pub struct Tabulated {
-    first: u32,
+    channel: usize,
     /// Total, 0 for matter that does not scatter; 1 where it is the kernels' strength.
     strength: f64,
     rate: f64,
-    values: Vec<f32>,
-    within: Vec<f32>,
-}
-
-/// One channel at one node of the curvature.
-#[derive(Clone, Copy)]
-struct Column<'a> {
     first: u32,
-    reached: usize,
-    values: &'a [f32],
-    within: &'a [f32],
+    /// Of the half-space's node.
+    data: Vec<Vec3>,
 }
 
 /// Where a squared distance lies in the grid.
@@ -56,7 +48,42 @@ enum Place {
     Beyond,
 }
 
-impl Column<'_> {
+/// One node of the curvature.
+#[derive(Clone, Copy)]
+struct Node<'a> {
+    first: u32,
+    curvature: f64,
+    /// Cells that its sphere reaches.
+    reached: usize,
+    /// 1 / mass, and k, of the channels.
+    densities: DVec3,
+    slope: DVec3,
+    values: &'a [Vec3],
+    within: &'a [Vec3],
+}
+
+impl<'a> Node<'a> {
+    /// Node k of a material's table.
+    fn of(matter: Matter<'a>, k: usize) -> Node<'a> {
+        let Material { table, table_first, table_cells, .. } = *matter.material;
+        let stride = Block::stride(table_cells);
+        Node::new(table_first, &matter.tables[table as usize + k * stride..][..stride])
+    }
+
+    fn new(first: u32, data: &'a [Vec3]) -> Node<'a> {
+        let (header, nodes) = data.split_at(HEADER);
+        let (values, within) = nodes.split_at(nodes.len() / 2);
+        Node {
+            first,
+            curvature: header[0].x.into(),
+            reached: header[0].y as usize,
+            densities: header[1].as_dvec3(),
+            slope: header[2].as_dvec3(),
+            values,
+            within,
+        }
+    }
+
     /// Where the squared distance lies in the grid.
     fn place(&self, s: f64) -> Place {
         let cell = grid::cell(s as f32);
@@ -71,87 +98,50 @@ impl Column<'_> {
         Place::Cell { i, past: s - low, t: (s - low) / (high - low) }
     }
 
-    /// Value at the squared distance.
-    fn value(&self, s: f64) -> f64 {
-        self.value_in(self.place(s))
+    /// Values at the squared distance.
+    fn values(&self, s: f64) -> DVec3 {
+        self.values_in(self.place(s))
     }
 
-    fn value_in(&self, place: Place) -> f64 {
+    fn values_in(&self, place: Place) -> DVec3 {
         match place {
-            Place::Before(_) => f64::from(self.within[0]) / (PI * f64::from(grid::node(self.first))),
-            Place::Cell { i, t, .. } => f64::from(self.values[i]) * (1.0 - t) + f64::from(self.values[i + 1]) * t,
-            Place::Beyond => 0.0,
+            Place::Before(_) => self.within[0].as_dvec3() / (PI * f64::from(grid::node(self.first))),
+            Place::Cell { i, t, .. } => self.values[i].as_dvec3().lerp(self.values[i + 1].as_dvec3(), t),
+            Place::Beyond => DVec3::ZERO,
         }
     }
 
-    /// Squared distance within which the share u of the light lies.
-    fn draw(&self, u: f64) -> f64 {
-        let target = u * f64::from(self.within[self.reached]);
-        let first = f64::from(grid::node(self.first));
-        if target < f64::from(self.within[0]) {
-            return first * target / f64::from(self.within[0]);
+    /// Squared distance within which the share u of a channel's light lies.
+    fn draw(&self, c: usize, u: f64) -> f64 {
+        let within = |i: usize| f64::from(self.within[i][c]);
+        let target = u * within(self.reached);
+        if target < within(0) {
+            return f64::from(grid::node(self.first)) * target / within(0);
         }
-        let i = self.within[..self.reached].partition_point(|&light| f64::from(light) <= target) - 1;
+        let i = self.within[..self.reached].partition_point(|light| f64::from(light[c]) <= target) - 1;
         let [low, high] = [0, 1].map(|k| f64::from(grid::node(self.first + i as u32 + k)));
-        let [a, b] = [i, i + 1].map(|i| f64::from(self.values[i]));
+        let [a, b] = [i, i + 1].map(|i| f64::from(self.values[i][c]));
         // Light from the edge over the cell's area: a t + (b - a) t^2 / 2.
-        let q = (target - f64::from(self.within[i])) / (PI * (high - low));
+        let q = (target - within(i)) / (PI * (high - low));
         let root = a + (a * a + 2.0 * (b - a) * q).max(0.0).sqrt();
         let t = if root > 0.0 { (2.0 * q / root).min(1.0) } else { 0.0 };
         low + t * (high - low)
     }
 
-    fn total(&self) -> f64 {
-        f64::from(self.within[self.reached])
+    fn total(&self) -> DVec3 {
+        self.within[self.reached].as_dvec3()
     }
 
     /// Light within the squared distance.
-    fn inside(&self, s: f64) -> f64 {
-        self.inside_of(self.place(s))
-    }
-
-    fn inside_of(&self, place: Place) -> f64 {
+    fn inside(&self, place: Place) -> DVec3 {
         match place {
-            Place::Before(share) => f64::from(self.within[0]) * share,
+            Place::Before(share) => self.within[0].as_dvec3() * share,
             Place::Cell { i, past, .. } => {
-                f64::from(self.within[i]) + PI * past * (f64::from(self.values[i]) + self.value_in(place)) / 2.0
+                let mean = (self.values[i].as_dvec3() + self.values_in(place)) / 2.0;
+                self.within[i].as_dvec3() + PI * past * mean
             }
             Place::Beyond => self.total(),
         }
-    }
-}
-
-/// Node k of a material's table.
-struct Node<'a> {
-    data: &'a [f32],
-    first: u32,
-    cells: usize,
-}
-
-impl<'a> Node<'a> {
-    fn of(matter: Matter<'a>, k: usize) -> Node<'a> {
-        let Material { table, table_first, table_cells, .. } = *matter.material;
-        let stride = Block::stride(table_cells);
-        let data = &matter.tables[table as usize + k * stride..][..stride];
-        Node { data, first: table_first, cells: table_cells as usize }
-    }
-
-    fn curvature(&self) -> f64 {
-        f64::from(self.data[0])
-    }
-
-    fn vector(&self, at: usize) -> DVec3 {
-        DVec3::from([0, 1, 2].map(|c| f64::from(self.data[at + c])))
-    }
-
-    fn column(&self, c: usize) -> Column<'a> {
-        let n = self.cells + 1;
-        let (values, within) = self.data[HEADER + 2 * c * n..][..2 * n].split_at(n);
-        Column { first: self.first, reached: self.data[1] as usize, values, within }
-    }
-
-    fn values(&self, s: f64) -> DVec3 {
-        DVec3::from([0, 1, 2].map(|c| self.column(c).value(s)))
     }
 }
 
@@ -190,7 +180,7 @@ impl Part {
 fn parts(matter: Matter) -> Vec<Part> {
     let curvature = matter.curvature;
     let count = matter.material.table_nodes as usize;
-    let of = |k: usize| Node::of(matter, k).curvature();
+    let of = |k: usize| Node::of(matter, k).curvature;
     let scale = 0.25 * curvature * curvature;
     // Curvatures fall from node to node.
     let above = (0..count).take_while(|&k| of(k) > curvature).count();
@@ -240,9 +230,10 @@ pub(in crate::reference) fn weighed(matter: Matter, s: f64) -> f64 {
     let Material { table, table_first, table_cells, table_nodes, .. } = *matter.material;
     let values = &matter.tables[table as usize + table_nodes as usize * Block::stride(table_cells)..];
     let i = grid::cell(s as f32).clamp(table_first, table_first + table_cells - 1) - table_first;
-    let [low, high] = [i, i + 1].map(|i| (f64::from(grid::node(table_first + i)), f64::from(values[i as usize])));
-    let t = ((s - low.0) / (high.0 - low.0)).clamp(0.0, 1.0);
-    low.1 * (1.0 - t) + high.1 * t
+    let [low, high] = [i, i + 1].map(|i| f64::from(grid::node(table_first + i)));
+    let t = ((s - low) / (high - low)).clamp(0.0, 1.0);
+    let cell = values[i as usize].as_dvec3();
+    cell.x * (1.0 - t) + cell.y * t
 }
 
 /// shape(r) of the three channels.
@@ -255,20 +246,17 @@ pub(super) fn drawn(matter: Matter, r: f64, node: f64, u: f64) -> DVec3 {
     let parts = parts(matter);
     let part = &parts[usize::from(node >= parts[0].weight)];
     let (s, area) = part.bent(r * r);
-    let of = |c: usize| {
-        let column = Node::of(matter, part.node).column(c);
-        match column.place(s) {
-            Place::Cell { i, t, .. } => f64::from(column.values[i + usize::from(u < t)]),
-            place => column.value_in(place),
-        }
-    };
-    area * DVec3::from([0, 1, 2].map(of))
+    let node = Node::of(matter, part.node);
+    area * match node.place(s) {
+        Place::Cell { i, t, .. } => node.values[i + usize::from(u < t)].as_dvec3(),
+        place => node.values_in(place),
+    }
 }
 
 /// Density of the sampled radii per area of the plane.
 pub(super) fn density(matter: Matter, r: f64) -> f64 {
     let of = |part: &Part| {
-        let normalised = part.values(matter, r) * Node::of(matter, part.node).vector(2);
+        let normalised = part.values(matter, r) * Node::of(matter, part.node).densities;
         normalised.dot(matter.material.density.as_dvec3())
     };
     parts(matter).iter().map(of).sum()
@@ -278,12 +266,12 @@ pub(super) fn density(matter: Matter, r: f64) -> f64 {
 pub(super) fn radius(matter: Matter, c: usize, share: f64, u: f64) -> f64 {
     let parts = parts(matter);
     let part = &parts[usize::from(parts.len() > 1 && share >= parts[0].weight)];
-    part.unbent(Node::of(matter, part.node).column(c).draw(u))
+    part.unbent(Node::of(matter, part.node).draw(c, u))
 }
 
 /// k of the three channels.
 pub(in crate::reference) fn slope(matter: Matter) -> DVec3 {
-    parts(matter).iter().map(|part| part.weight * Node::of(matter, part.node).vector(5)).sum()
+    parts(matter).iter().map(|part| part.weight * Node::of(matter, part.node).slope).sum()
 }
 
 /// The factor 1 + k (1 - mu') on light that enters, or 1 over its mean times it on light that leaves, at the cosine
@@ -295,50 +283,46 @@ pub(super) fn obliqueness(material: &Material, slope: DVec3, cos: f64, leaving: 
 
 /// The profile of a material at one curvature, over its strength.
 pub struct Local<'a> {
-    parts: Vec<(Part, [Column<'a>; 3])>,
+    parts: Vec<(Part, Node<'a>)>,
 }
 
 impl<'a> Local<'a> {
     pub fn new(matter: Matter<'a>) -> Local<'a> {
         let of = |part: Part| {
-            let columns = [0, 1, 2].map(|c| Node::of(matter, part.node).column(c));
-            (part, columns)
+            let node = Node::of(matter, part.node);
+            (part, node)
         };
         Local { parts: parts(matter).into_iter().map(of).collect() }
     }
 
-    fn sum(&self, f: impl Fn(&Part, &[Column; 3]) -> DVec3) -> DVec3 {
-        self.parts.iter().map(|(part, columns)| part.weight * f(part, columns)).sum()
+    fn sum(&self, f: impl Fn(&Part, &Node) -> DVec3) -> DVec3 {
+        self.parts.iter().map(|(part, node)| part.weight * f(part, node)).sum()
     }
 
     /// Value at the squared distance.
     pub fn value(&self, squared: f64) -> DVec3 {
-        self.sum(|part, columns| {
+        self.sum(|part, node| {
             let (s, area) = part.bent(squared);
-            let place = columns[0].place(s);
-            area * DVec3::from(columns.each_ref().map(|column| column.value_in(place)))
+            area * node.values(s)
         })
     }
 
     /// Light within the squared distance.
     pub fn inside(&self, squared: f64) -> DVec3 {
-        self.sum(|part, columns| {
+        self.sum(|part, node| {
             let (s, area) = part.bent(squared);
-            let place = if area > 0.0 { columns[0].place(s) } else { Place::Beyond };
-            DVec3::from(columns.each_ref().map(|column| column.inside_of(place)))
+            node.inside(if area > 0.0 { node.place(s) } else { Place::Beyond })
         })
     }
 
     /// All light.
     pub fn total(&self) -> DVec3 {
-        self.sum(|_, columns| DVec3::from(columns.each_ref().map(Column::total)))
+        self.sum(|_, node| node.total())
     }
 
     /// Distance beyond which there is nothing.
     pub fn end(&self) -> f64 {
-        let of = |(part, columns): &(Part, [Column; 3])| {
-            part.unbent(f64::from(grid::node(columns[0].first + columns[0].reached as u32)))
-        };
+        let of = |(part, node): &(Part, Node)| part.unbent(f64::from(grid::node(node.first + node.reached as u32)));
         self.parts.iter().map(of).fold(0.0, f64::max)
     }
 }
@@ -347,38 +331,32 @@ impl Tabulated {
     /// The channel on a half-space.
     pub(super) fn of(matter: &Coefficients) -> Tabulated {
         let channel = table::channel(matter);
-        let block = Block::new(&[channel.clone(), None, None], &[]);
-        let n = block.cells as usize + 1;
-        let (values, within) = block.data[HEADER..HEADER + 2 * n].split_at(n);
+        let mut block = Block::new(&[channel.clone(), None, None], &[]);
+        block.data.truncate(Block::stride(block.cells));
         Tabulated {
-            first: block.first,
+            channel: 0,
             strength: block.totals.x,
             rate: channel.map_or(0.0, |channel| channel.rate()),
-            values: values.to_vec(),
-            within: within.to_vec(),
+            first: block.first,
+            data: block.data,
         }
     }
 
-    pub(super) fn unpack(matter: Matter, c: usize) -> Tabulated {
-        let node = Node::of(matter, matter.material.table_nodes as usize - 1);
-        let column = node.column(c);
-        Tabulated {
-            first: column.first,
-            strength: 1.0,
-            rate: f64::from(matter.material.sigma_tr[c]),
-            values: column.values.to_vec(),
-            within: column.within.to_vec(),
-        }
+    pub(super) fn unpack(matter: Matter, channel: usize) -> Tabulated {
+        let Material { table, table_first, table_cells, table_nodes, sigma_tr, .. } = *matter.material;
+        let stride = Block::stride(table_cells);
+        let data = matter.tables[table as usize + (table_nodes as usize - 1) * stride..][..stride].to_vec();
+        Tabulated { channel, strength: 1.0, rate: f64::from(sigma_tr[channel]), first: table_first, data }
     }
 
-    fn column(&self) -> Column<'_> {
-        Column { first: self.first, reached: self.values.len() - 1, values: &self.values, within: &self.within }
+    fn node(&self) -> Node<'_> {
+        Node::new(self.first, &self.data)
     }
 }
 
 impl Radial for Tabulated {
     fn shape_shifted(&self, r: f64, exponent: f64) -> f64 {
-        shifted(self.column().value(r * r), exponent)
+        shifted(self.node().values(r * r)[self.channel], exponent)
     }
 
     fn strength(&self) -> f64 {
@@ -386,11 +364,12 @@ impl Radial for Tabulated {
     }
 
     fn masses(&self) -> [f64; COMPONENTS] {
-        [f64::from(*self.within.last().expect("a table has nodes")), 0.0, 0.0]
+        [self.node().total()[self.channel], 0.0, 0.0]
     }
 
     fn inside(&self, radius: f64) -> f64 {
-        self.column().inside(radius * radius)
+        let node = self.node();
+        node.inside(node.place(radius * radius))[self.channel]
     }
 
     fn outside(&self, radius: f64) -> f64 {
@@ -408,11 +387,11 @@ impl Radial for Tabulated {
             crate::reference::math::integrate(a, b, panels, |r| 2.0 * PI * r * self.shape(r) * bessel(k * r))
         };
         let edge = |i: usize| f64::from(grid::node(self.first + i as u32)).sqrt();
-        ring(0.0, edge(0)) + (1..self.values.len()).map(|i| ring(edge(i - 1), edge(i))).sum::<f64>()
+        ring(0.0, edge(0)) + (1..self.node().values.len()).map(|i| ring(edge(i - 1), edge(i))).sum::<f64>()
     }
 
     fn radius(&self, _component: usize, _share: f64, u: f64) -> f64 {
-        self.column().draw(u).sqrt()
+        self.node().draw(self.channel, u).sqrt()
     }
 
     fn rate(&self) -> f64 {
