@@ -44,25 +44,22 @@ float table_bent(float r2, float bend, out float area) {
     area = 1.0;
     if (CURVATURE == 0 || bend == 0.0) return r2;
     float q = r2 * table_scale;
-    float d = 1.0 + bend * q;
-    area = q <= 1.0 ? (1.0 - bend * q) / (d * d * d) : 0.0;
-    return q <= 1.0 ? r2 / (d * d) : 0.0;
+    float over = 1.0 / (1.0 + bend * q);
+    area = q <= 1.0 ? (1.0 - bend * q) * over * over * over : 0.0;
+    return q <= 1.0 ? r2 * over * over : 0.0;
 }
 
 // The channels' values at one curvature.
 vec3 table_value(Material m, uint node, float r2) {
     uint base = table_base(m, node);
     uint cell = floatBitsToUint(r2) >> TABLE_SHIFT;
-    uint nodes = m.table_cells + 1u;
     bool before = cell < m.table_first;
     if (!before && cell - m.table_first >= uint(profiles[base].y)) return vec3(0.0);
     float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
-    float t = (r2 - low) / (high - low);
-    // Before the first cell the light within it counts; a branch would read both on a device whose lanes take all.
-    uint i = base + TABLE_HEADER + (before ? nodes : cell - m.table_first);
-    vec3 a = profiles[i];
-    vec3 b = profiles[i + (before ? 0u : 1u)];
-    return before ? a / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT)) : mix(a, b, t);
+    // The value below the first node stands before that of the node.
+    uint i = base + TABLE_HEADER + cell - m.table_first;
+    i = before ? base + TABLE_HEADER - 1u : i;
+    return mix(profiles[i], profiles[before ? i : i + 1u], before ? 0.0 : (r2 - low) / (high - low));
 }
 
 // Values between the two curvatures. Those of a density are divided by their masses.
@@ -125,10 +122,8 @@ vec3 table_drawn(Material m, float r2, float u) {
     bool before = cell < m.table_first;
     uint i = before ? 0u : cell - m.table_first;
     if (!before && i >= table_reached) return vec3(0.0);
-    uint nodes = m.table_cells + 1u;
-    uint at = table_values + (before ? nodes : i + (u * (high - low) < bent - low ? 1u : 0u));
-    vec3 value = area * profiles[at];
-    return before ? value / (PI * uintBitsToFloat(m.table_first << TABLE_SHIFT)) : value;
+    i = table_values + i + (u * (high - low) < bent - low ? 1u : 0u);
+    return area * profiles[before ? table_values - 1u : i];
 }
 
 // Squared distance beyond which both curvatures have no light.

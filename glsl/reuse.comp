@@ -36,24 +36,27 @@ void main() {
         table_draw(m, unit(hash(key)));
     }
     uint turn = hash(key + 1u);
-    float reach2 = uintBitsToFloat(probes[index].seat.w);
+    float reach2 = uintBitsToFloat(probes[index].seat.w), own_r2 = probes[index].hit_r2;
     vec3 sum = vec3(0.0);
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
-    uint n = 0u;
-    Member member = first_member(tile, view.crop_width);
+    uint row = tile.first.y * view.crop_width + tile.first.x;
+    uvec2 at = uvec2(0u);
     [[dont_unroll]] do {
-        bool there = in_band(tile, member);
-        uint other = there ? member.index : index;
-        turn += there ? GOLDEN : 0u;
-        uvec4 lit = probes[other].lit;
-        vec3 light = uintBitsToFloat(lit.xyz);
-        if (there && lit.w == share && light != vec3(0.0)) {
-            vec3 delta = probes[other].hit - surface.position;
-            float r2 = other == index ? probes[index].hit_r2 : dot(delta, delta);
-            if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));
-        }
-        next_member(tile, view.crop_width, member);
-    } while (++n < REUSE * REUSE);
+        at.x = 0u;
+        [[dont_unroll]] do {
+            bool there = in_band(tile, at);
+            uint other = there ? row + at.x : index;
+            turn += there ? GOLDEN : 0u;
+            uvec4 lit = probes[other].lit;
+            vec3 light = uintBitsToFloat(lit.xyz);
+            if (there && lit.w == share && light != vec3(0.0)) {
+                vec3 delta = probes[other].hit - surface.position;
+                float r2 = other == index ? own_r2 : dot(delta, delta);
+                if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));
+            }
+        } while (++at.x < REUSE);
+        row += view.crop_width;
+    } while (++at.y < REUSE);
 
     Seen s = seen(view, surface, triangles[surface.triangle], shading);
     float cos_eye = dot(s.shading_normal, s.wo);

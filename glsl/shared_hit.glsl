@@ -20,21 +20,24 @@ float tile_weight(Material m, float r2) {
 float tile_share(Tile tile, uint width, Material m, uint index, vec3 hit, float hit_r2) {
     float own = 0.0, sum = 0.0;
     uint share = probes[index].lit.w;
-    uint n = 0u;
-    Member member = first_member(tile, width);
+    uint row = tile.first.y * width + tile.first.x;
+    uvec2 at = uvec2(0u);
     [[dont_unroll]] do {
-        bool there = in_band(tile, member);
-        uint other = there ? member.index : index;
-        if (there && probes[other].lit.w == share) {
-            vec4 seat = uintBitsToFloat(probes[other].seat);
-            vec3 delta = hit - seat.xyz;
-            // Its own hits count as in reach.
-            float r2 = other == index ? hit_r2 : dot(delta, delta);
-            float weight = tile_weight(m, r2);
-            if (other == index) own = weight;
-            if (other == index || r2 <= seat.w) sum += weight;
-        }
-        next_member(tile, width, member);
-    } while (++n < REUSE * REUSE);
+        at.x = 0u;
+        [[dont_unroll]] do {
+            bool there = in_band(tile, at);
+            uint other = there ? row + at.x : index;
+            if (there && probes[other].lit.w == share) {
+                vec4 seat = uintBitsToFloat(probes[other].seat);
+                vec3 delta = hit - seat.xyz;
+                // Its own hits count as in reach.
+                float r2 = other == index ? hit_r2 : dot(delta, delta);
+                float weight = tile_weight(m, r2);
+                if (other == index) own = weight;
+                if (other == index || r2 <= seat.w) sum += weight;
+            }
+        } while (++at.x < REUSE);
+        row += width;
+    } while (++at.y < REUSE);
     return own / sum;
 }

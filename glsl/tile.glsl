@@ -19,11 +19,16 @@ Place place_of(View view, uint index, uint batch) {
     return Place(pixel / REUSE, pixel.y % REUSE * REUSE + pixel.x % REUSE);
 }
 
-// The part of a tile that is in the band: from the first to before the last column and row of the band.
+// The part of a tile that is in the band: from the first to before the last column and row of the band. Its members are
+// gone through in two loops over all of its places, as many for all pixels.
 struct Tile {
     uvec2 first;
     uvec2 end;
 };
+
+bool in_band(Tile tile, uvec2 at) {
+    return all(lessThan(tile.first + at, tile.end));
+}
 
 Tile tile_of(View view, Place place, uint batch) {
     ivec2 corner = ivec2(REUSE * place.tile - tile_offset(batch)) - ivec2(view.crop_x, step_.first_row);
@@ -31,25 +36,6 @@ Tile tile_of(View view, Place place, uint batch) {
     return Tile(uvec2(max(corner, ivec2(0))), uvec2(clamp(corner + int(REUSE), ivec2(0), size)));
 }
 
-// Goes through the places of a tile, row by row; `index` is that in the band.
-struct Member {
-    uint index;
-    uvec2 at;
-};
-
-Member first_member(Tile tile, uint width) {
-    return Member(tile.first.y * width + tile.first.x, tile.first);
-}
-
-void next_member(Tile tile, uint width, inout Member member) {
-    bool row = member.at.x == tile.first.x + REUSE - 1u;
-    member.index += row ? width - (REUSE - 1u) : 1u;
-    member.at = row ? uvec2(tile.first.x, member.at.y + 1u) : uvec2(member.at.x + 1u, member.at.y);
-}
-
-bool in_band(Tile tile, Member member) {
-    return member.at.x < tile.end.x && member.at.y < tile.end.y;
-}
 
 // The sample's first Probe::share.
 uint first_share(View view) {

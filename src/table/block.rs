@@ -9,7 +9,7 @@
 //! # Layout
 //! All are vectors, mostly of the three channels: a device without a gather instruction takes as long for one as for a number.
 //! Node by node of the curvature: (1/a, the number of cells that the sphere reaches, 0), 1 / mass, slope of the total in
-//! 1 - mu'; then the values at the nodes of the grid, and the light within them.
+//! 1 - mu', the value below the first node; then the values at the nodes of the grid, and the light within them.
 //! A profile is divided by the total of the half-space, which is in the material's strength. After the last curvature comes
 //! what tiles weigh hits by: for each cell the half-space's values at its two nodes, not divided, summed over channels.
 
@@ -110,6 +110,8 @@ impl Block {
         let nodes = || 0..=self.cells as usize;
         let mut data = vec![Vec3::new(curvature as f32, reached as f32, 0.0)];
         data.extend([vector(&|column, total| total / column.total), vector(&|column, _| column.slope)]);
+        let inner = PI * f64::from(grid::node(self.first));
+        data.push(vector(&|column, total| column.within[0] / total / inner));
         data.extend(nodes().map(|i| vector(&|column, total| column.values[i] / total)));
         data.extend(nodes().map(|i| vector(&|column, total| column.within[i] / total)));
         self.data.append(&mut data);

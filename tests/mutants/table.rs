@@ -56,7 +56,7 @@ mutants! {
     "profile_better.glsl", "index", "profile.better": "sources + m.fluence * line" => "sources + m.fluence.x * line";
     "profile_burley.glsl", "constant", "profile.burley": "shift - x * (1.0 / 3.0)" => "shift - x * (1.0 / 2.0)";
     "profile_directional.glsl", "sign", "profile.directional": "w_no - 2.0 * w_n * n_no" => "w_no + 2.0 * w_n * n_no";
-    "profile_table.glsl", "swapped", "profile.table": "mix(a, b, t);" => "mix(b, a, t);";
+    "profile_table.glsl", "swapped", "profile.table": "mix(profiles[i], profiles[before ? i : i + 1u]," => "mix(profiles[before ? i : i + 1u], profiles[i],";
     "profile.glsl", "swapped branch", "profile.lambert":
         "table_obliqueness(m, m.slope, c, leaving)" => "table_obliqueness(m, m.slope, c, !leaving)";
     "mixture.glsl", "index", "profile.mixture": "x - float(k)" => "x - float(k + 1u)";
@@ -115,7 +115,7 @@ mutants! {
         "u * (high - low) < bent - low ? 0u : 1u";
     "profile_table.glsl", "lost condition", "kernel.reuse": "CURVATURE != 0 && u >= table_weight ? 1u : 0u" => "0u";
     "reuse.comp", "lost condition", "kernel.reuse": "there && lit.w == share && " => "there && ";
-    "tile.glsl", "off by one", "kernel.accumulate": "member.at.x < tile.end.x" => "member.at.x <= tile.end.x";
+    "tile.glsl", "off by one", "kernel.accumulate": "lessThan(tile.first + at, tile.end)" => "lessThanEqual(tile.first + at, tile.end)";
     "accumulate.comp", "comparison", "kernel.accumulate": "u < chance" => "u > chance";
     "profile_table.glsl", "off by one", "kernel.accumulate": "table_base(m, m.table_nodes) + cell" => "table_base(m, m.table_nodes) + 1u + cell";
     "sample.comp", "sign", "kernel.sample": "probe.t_max = -b + half_chord;" => "probe.t_max = b + half_chord;";

@@ -58,6 +58,8 @@ struct Node<'a> {
     /// 1 / mass, and k, of the channels.
     densities: DVec3,
     slope: DVec3,
+    /// Values below the first node.
+    inner: DVec3,
     values: &'a [Vec3],
     within: &'a [Vec3],
 }
@@ -79,6 +81,7 @@ impl<'a> Node<'a> {
             reached: header[0].y as usize,
             densities: header[1].as_dvec3(),
             slope: header[2].as_dvec3(),
+            inner: header[3].as_dvec3(),
             values,
             within,
         }
@@ -105,7 +108,7 @@ impl<'a> Node<'a> {
 
     fn values_in(&self, place: Place) -> DVec3 {
         match place {
-            Place::Before(_) => self.within[0].as_dvec3() / (PI * f64::from(grid::node(self.first))),
+            Place::Before(_) => self.inner,
             Place::Cell { i, t, .. } => self.values[i].as_dvec3().lerp(self.values[i + 1].as_dvec3(), t),
             Place::Beyond => DVec3::ZERO,
         }
