@@ -75,7 +75,7 @@
 //!
 //! *Tiles.* `accumulate` leaves the hit that it lit in Probes, with its light over the weights of the tile's pixels, and
 //! `reuse` adds the tile's hits to each pixel ([`reference::reuse`]). Tiles lie elsewhere in each batch. Around a crop
-//! the pixels are rendered, too, whose hits it shares. What was written in another sample is told by `Probe::share`.
+//! the pixels are rendered, too, whose hits it shares. What was written in another sample is told by [`shared::Probe::share`].
 //!
 //! *Lists.* `primary` lists the pixels of a batch that see something, and the kernels after it are dispatched indirectly
 //! over that list alone. Where an image is to have a certain error ([`Renderer::render_until`]), the host also lists the

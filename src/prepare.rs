@@ -170,7 +170,11 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
     if ![1, 2, 4, 8].contains(&settings.reuse) {
         return Err(Error::setting("reuse", format!("{} is not 1, 2, 4 or 8", settings.reuse)));
     }
-    let looks_up = settings.integrator == Integrator::Sample && settings.reproject == Reproject::Screen;
+    let looks_up = settings.reproject == Reproject::Screen;
+    if looks_up && settings.integrator != Integrator::Sample {
+        let problem = format!("is for the probes of the integrator sample; {} has none", settings.integrator);
+        return Err(Error::setting("reproject screen", problem));
+    }
     if looks_up && settings.projection == Projection::Normal {
         let problem = "knows what camera rays meet; the projection normal needs others: use mis or camera";
         return Err(Error::setting("reproject screen", problem));

@@ -29,10 +29,10 @@ pub(super) fn points(scene: &Scene, settings: &Settings, materials: &[Material])
     if !(tolerance >= 0.0 && tolerance.is_finite()) {
         return Err(Error::setting("cache tolerance", format!("{tolerance} is not a number from 0")));
     }
-    if settings.integrator != Integrator::Sample {
-        return Ok(cache::Cache::default());
-    }
     let refuse = |problem: String| Err(Error::setting("irradiance cached", problem));
+    if settings.integrator != Integrator::Sample {
+        return refuse(format!("is for the integrator sample; {} finds its light otherwise", settings.integrator));
+    }
     if settings.recording {
         return refuse("does not go into recordings; render with it, or record with direct".into());
     }

@@ -12,7 +12,7 @@ use translucent::{
     cache::Geometry,
     prepare::prepare,
     scene::Environment,
-    settings::{Cache, Irradiance},
+    settings::{Cache, Integrator, Irradiance},
 };
 
 fn settings(irradiance: Irradiance) -> Settings {
@@ -217,6 +217,7 @@ fn what_cannot_be_kept_is_refused() {
     let cached = settings(Irradiance::Cached);
     refused(Settings { model: Model::Directional, ..cached.clone() }, "directional dipole");
     refused(Settings { recording: true, ..cached.clone() }, "recordings");
+    refused(Settings { integrator: Integrator::Cloud, ..cached.clone() }, "integrator sample");
     refused(Settings { cache: Cache { samples: 1, ..Cache::default() }, ..cached.clone() }, "cache samples");
     refused(Settings { cache: Cache { spacing: 0.0, ..Cache::default() }, ..cached.clone() }, "cache spacing");
     refused(Settings { cache: Cache { tolerance: f64::NAN, ..Cache::default() }, ..cached.clone() }, "cache tolerance");

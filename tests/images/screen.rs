@@ -14,7 +14,7 @@ use translucent::{
         profile::{Dipole, Radial},
     },
     scene::Environment,
-    settings::Reproject,
+    settings::{Integrator, Reproject},
 };
 
 /// A slab that fills the image, seen at an angle, under the sun. Its mean free path is 1 m: edges and back are beyond the
@@ -144,7 +144,9 @@ fn the_image_is_one_band() {
 #[test]
 fn what_a_g_buffer_does_not_hold_is_refused() {
     let device = device();
-    let settings = settings(Projection::Normal, Reproject::Screen);
-    let refused = Renderer::new(&device, &ball(3.0, 0.3), &settings).err().expect("it is refused");
-    assert!(matches!(&refused, Error::Setting { .. }) && refused.to_string().contains("normal"), "{refused}");
+    let gathered = Settings { integrator: Integrator::Cloud, ..settings(Projection::Mis, Reproject::Screen) };
+    for (settings, word) in [(settings(Projection::Normal, Reproject::Screen), "normal"), (gathered, "cloud")] {
+        let refused = Renderer::new(&device, &ball(3.0, 0.3), &settings).err().expect("it is refused");
+        assert!(matches!(&refused, Error::Setting { .. }) && refused.to_string().contains(word), "{refused}");
+    }
 }
