@@ -12,8 +12,8 @@ void table_of(Probe probe) {
 // G: about the profile of light that enters at a squared distance, the same for all pixels that share the hit.
 float tile_weight(Material m, float r2) {
     if (has_model(m, MODEL_TABLE)) return table_weighed(m, r2);
-    float r = sqrt(r2);
-    return exp_(-m.camera_rate * r) / (r + (BURLEY_RADIUS_MIN + (m.z_real.x + m.z_real.y + m.z_real.z) * (1.0 / 3.0)));
+    vec3 value = m.strength * shape(m, r2);
+    return value.x + value.y + value.z;
 }
 
 // Of the hit of pixel `index` its weight over that of all pixels of the tile that may find it.

@@ -1,10 +1,10 @@
 //! What a lit hit brings to the pixels of its tile: twin of `shared_hit.glsl`. See [`reuse`](mod@super::reuse).
 
-use super::profile::{Matter, table};
+use super::profile::{Matter, shapes, table};
 use super::projection::matter_at;
 use super::tile::{Place, members};
 use super::{Inputs, reuse::Stage};
-use crate::shared::{BURLEY_RADIUS_MIN, MODEL_TABLE, Material, Step};
+use crate::shared::{MODEL_TABLE, Step};
 use glam::DVec3;
 
 /// Distance beyond which a pixel's profile ends, or the ball in which its probes look.
@@ -13,15 +13,13 @@ pub fn reach(matter: Matter) -> f64 {
     if matter.material.model == MODEL_TABLE { table::reach(matter).min(radius) } else { radius }
 }
 
-/// G: about the profile at a distance, the same for all pixels that share the hit, by as few reads and exponentials as do:
-/// of a tabulated one that of the half-space, all channels together; else e^(-k r) / (r + z), where k is the least rate of
-/// a channel and z the mean depth of the real sources.
+/// G: about the profile at a distance, the same for all pixels that share the hit; of a tabulated one that of the half-space,
+/// all channels together, which takes one read. (One exponential in place of a profile was tried: where tiles are many mean
+/// free paths wide, its tails make fireflies.)
 pub fn weight(matter: Matter, r: f64) -> f64 {
-    let Material { model, camera_rate, z_real, .. } = *matter.material;
-    let depth = z_real.as_dvec3().element_sum() / 3.0 + f64::from(BURLEY_RADIUS_MIN);
-    match model {
+    match matter.material.model {
         MODEL_TABLE => table::weighed(matter, r * r),
-        _ => (-f64::from(camera_rate) * r).exp() / (r + depth),
+        _ => (matter.material.strength.as_dvec3() * shapes(matter, r)).element_sum(),
     }
 }
 

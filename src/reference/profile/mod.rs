@@ -33,6 +33,7 @@ pub use table::Tabulated;
 
 use super::boundary::{Side, diffuse_reflectance};
 use super::rough::Rough;
+use crate::prepare::SET_DIAMETER;
 use crate::scene::{LengthKind, Medium};
 use crate::settings::{self, Model, Normalisation};
 use crate::shared::{
@@ -303,9 +304,9 @@ pub fn draw_radius(matter: Matter, u_component: f64, u_radius: f64) -> f64 {
     Profile::unpack(matter, component / COMPONENTS).radius(component % COMPONENTS, share, u_radius)
 }
 
-/// Of an equal share, what each channel's probability is at least: bounds the variance of any channel at four times that of
-/// equal shares.
-pub const LEAST_CHANNEL: f64 = 0.25;
+/// Of an equal share, what each channel's probability is at least: bounds the variance of any channel at twice that of equal
+/// shares.
+pub const LEAST_CHANNEL: f64 = 0.5;
 
 /// What the kernels' constants depend on besides the matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -327,10 +328,12 @@ impl Options {
 }
 
 /// Probabilities with which radii are drawn from the channels' profiles: in proportion to the radius that nine tenths of a
-/// channel's light stay within, since light from afar is what is found least, and at least [`LEAST_CHANNEL`] of an equal
-/// share. 0 for a channel that does not scatter.
+/// channel's light stay within, since light from afar is what is found least, but none beyond the farthest points of a set
+/// ([`SET_DIAMETER`]); and at least [`LEAST_CHANNEL`] of an equal share. 0 for a channel that does not scatter.
 pub fn chances(channels: &[Profile; 3]) -> [f64; 3] {
-    let widths = channels.each_ref().map(|c| if c.strength() > 0.0 { c.radius_beyond(0.1) } else { 0.0 });
+    let widths = channels
+        .each_ref()
+        .map(|c| if c.strength() > 0.0 { c.radius_beyond(0.1).min(SET_DIAMETER.into()) } else { 0.0 });
     let equal = 1.0 / channels.iter().filter(|c| c.strength() > 0.0).count().max(1) as f64;
     let sum: f64 = widths.iter().sum();
     [0, 1, 2].map(|c| match channels[c].strength() > 0.0 {
