@@ -89,7 +89,7 @@ fn every_matter_has_its_radiance() {
         let (mut scene, settings) = balls(&materials, 6, &mesh);
         scene.set_environment(Environment::constant(DVec3::ONE).expect("valid")).expect("valid");
         // No sample is invalid, as `render` checks.
-        let image = render(&scene, &Settings { model, single_scattering: SingleScattering::Off, ..settings }, 768);
+        let image = render(&scene, &Settings { model, single_scattering: SingleScattering::Off, ..settings }, 1280);
         assert!(image.channels.iter().all(|channel| channel.data.iter().all(|x| x.is_finite())));
         // The directional dipole has no closed form on a ball.
         let (Some(constant), false) = (profile::constant(model), model == Model::Directional) else { continue };

@@ -40,7 +40,7 @@ fn settings(reuse: u32, seed: u32) -> Settings {
 /// Six rays a sample, so light comes in two portions.
 #[test]
 fn tiles_are_the_twins() {
-    for (reuse, model, seed) in [(2, Model::Standard, 6), (4, Model::Table, 6), (8, Model::Burley, 1)] {
+    for (reuse, model, seed) in [(2, Model::Standard, 6), (4, Model::Table, 7), (8, Model::Burley, 1)] {
         let settings = Settings { resolution: Some((13, 11)), model, ..settings(reuse, seed) };
         let (image, twins) = both(&still_life(3.0), &settings, 9);
         let mut found = differences(&image, &twins);

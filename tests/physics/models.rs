@@ -173,9 +173,10 @@ fn an_authors_albedo_is_the_better_dipoles_total() {
 
 #[test]
 fn wide_channels_are_drawn_more_often() {
-    let profiles = channels(1e2 * dvec3(1.0, 4.0, 1e3), DVec3::ZERO, 1.4).map(|channel| Profile::new(MODEL_BURLEY, &channel));
-    // Lengths of 1, 1/4 and 1/1000; half is dealt out equally.
-    let expected = [1.0, 0.25, 0.001].map(|length: f64| 1.0 / 6.0 + 0.5 * length / 1.251);
+    let profiles =
+        channels(1e2 * dvec3(1.0, 4.0, 1e3), DVec3::ZERO, 1.4).map(|channel| Profile::new(MODEL_BURLEY, &channel));
+    // Lengths of 1, 1/4 and 1/1000; a quarter is dealt out equally.
+    let expected = [1.0, 0.25, 0.001].map(|length: f64| 1.0 / 12.0 + 0.75 * length / 1.251);
     let found = chances(&profiles);
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?} for {expected:?}");
     // Beyond the body all widths are alike.

@@ -304,9 +304,9 @@ pub fn draw_radius(matter: Matter, u_component: f64, u_radius: f64) -> f64 {
     Profile::unpack(matter, component / COMPONENTS).radius(component % COMPONENTS, share, u_radius)
 }
 
-/// Of an equal share, what each channel's probability is at least: bounds the variance of any channel at twice that of equal
-/// shares.
-pub const LEAST_CHANNEL: f64 = 0.5;
+/// Of an equal share, what each channel's probability is at least: bounds the variance of any channel at four times that of
+/// equal shares.
+pub const LEAST_CHANNEL: f64 = 0.25;
 
 /// What the kernels' constants depend on besides the matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
