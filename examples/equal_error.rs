@@ -3,9 +3,9 @@
 //! EXR file, the shortest of three runs, since what else a machine does only adds; relMSE (as `render --error` has it) is
 //! against a converged image of another seed.
 //!
-//!     cargo run --release --example equal_error [SAMPLES OF THE CONVERGED IMAGE [SCENE]]
+//!     cargo run --release --example equal_error [SAMPLES OF THE CONVERGED IMAGE [SCENE [METHOD]]]
 //!
-//! Or the most memory that one such run takes, and its time, and how long that is:
+//! Or the most memory that one such run takes, and its time:
 //!
 //!     cargo run --release --example equal_error peak SCENE METHOD SAMPLES [PIXELS OF A BAND]
 
@@ -289,14 +289,19 @@ fn main() -> Outcome<()> {
     println!("{:<16} {:<10} {:>9} {:>8} {:>8} {:>9}", "SCENE", "METHOD", "TRIANGLES", "SAMPLES", "TIME [s]", "relMSE");
     for name in NAMES.into_iter().filter(|name| arguments.get(1).is_none_or(|wanted| wanted == name)) {
         let subject = subject(name)?;
-        let [(_, sample), (_, burley), ..] = methods();
-        let [reference, of_burley] = [sample, burley].map(|settings| {
-            let settings = Settings { seed: 1000, ..settings };
-            subject.scene().and_then(|scene| render(scene, &settings, converged))
-        });
-        let (reference, of_burley) = (reference?, of_burley?);
+        // One for each model, by probes lit by shadow rays.
+        let mut references: Vec<(Model, Image)> = vec![];
+        let [(_, sample), ..] = methods();
         for (method, settings) in methods() {
-            let reference = if settings.model == Model::Burley { &of_burley } else { &reference };
+            if arguments.get(2).is_some_and(|wanted| wanted != method) {
+                continue;
+            }
+            let model = settings.model;
+            if references.iter().all(|(made, _)| *made != model) {
+                let settings = Settings { seed: 1000, model, ..sample.clone() };
+                references.push((model, render(subject.scene()?, &settings, converged)?));
+            }
+            let (_, reference) = references.iter().find(|(made, _)| *made == model).ok_or("it was made")?;
             // Squared error falls by one over samples at best, but for chance: what is far from enough is not tried.
             let mut least = 0.0;
             for samples in SAMPLES {

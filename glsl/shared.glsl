@@ -91,7 +91,7 @@ const uint MODEL_TABLE = 4u;
 const uint MODEL_LAMBERT = 5u;
 // Bits of an f32 below those that number a cell of a tabulated profile.
 const uint TABLE_SHIFT = 21u;
-// Numbers before a table's values at each curvature.
+// Vectors before a table's values at each curvature.
 const uint TABLE_HEADER = 4u;
 // Most halvings in the search of a distribution function, for at most 500 cells.
 const uint TABLE_HALVINGS = 9u;

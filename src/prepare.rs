@@ -6,7 +6,6 @@ mod kept;
 mod matter;
 mod sets;
 
-pub use matter::SET_DIAMETER;
 pub(crate) use matter::replaced;
 
 use matter::Matter;

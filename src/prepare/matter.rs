@@ -94,10 +94,6 @@ fn coefficients(medium: &Medium, ior: f64, scale: f64, c: usize) -> Coefficients
     if extinction > 0.0 { authored.in_units(extinction / kept) } else { authored }
 }
 
-/// No two points of a set are farther apart: the frame gives translucent geometry the radius 1. Nothing is missed, and a
-/// probe that runs within a triangle's plane meets no rounding of its distance that looks like a hit far away.
-pub const SET_DIAMETER: f32 = 2.000_01;
-
 /// Materials in the scene's order, then the ramps of those that have one.
 fn materials(
     scene: &Scene,
@@ -239,7 +235,7 @@ fn material(
                 Model::Lambert => lambert::limit(constant(choice.limit_of), &coefficients, options),
                 model => profile::material(constant(model), &coefficients, options),
             };
-            out.radius_max = out.radius_max.min(SET_DIAMETER);
+            out.radius_max = out.radius_max.min(profile::SET_DIAMETER);
             out.boundary = rough.map_or(0, |(table, _)| table);
             if mixed {
                 // What belongs to the exit is another material's, there.

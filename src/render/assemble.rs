@@ -6,9 +6,8 @@ use crate::{
     error::Result,
     gpu::{Buffer, download_to, give_back_freed},
     image::{Attribute, Channel, Image},
-    scene::{Camera, Frame},
     settings::{Cache, Cloud, Integrator, Irradiance},
-    shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle, View},
+    shared::{BATCHES, MISS, Pixel, Shading, Slot, Step, Surface, Triangle},
     timeline::{self, Work},
 };
 use glam::{DVec3, Vec3};
@@ -31,6 +30,9 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
     let count = (view.crop_width * (rows.end - rows.start)) as usize;
     let range = renderer.samples();
     let has_variance = renderer.prepared.features.batches != 0 && range.end - range.start >= BATCHES;
+
+    // The device has the geometry already, so the host need not keep it while rendering.
+    let geometry = Geometry { triangles: copy(renderer, Slot::Triangles)?, shadings: copy(renderer, Slot::Shadings)? };
     let mut channels = Channels::new(count, has_variance);
     let (mut invalid, mut total, mut most) = (0u64, 0u64, 0);
     // First the band on the device, which need not go to the host then.
@@ -57,18 +59,11 @@ pub fn image(renderer: &mut Renderer, sums: Sums) -> Result<Image> {
         let resolved: Vec<Pixel> = read(renderer, Slot::Pixels, pixels as usize)?;
         let surfaces: Vec<Surface> = read(renderer, Slot::Surfaces, pixels as usize)?;
         drop(span);
-        let (resolved, surfaces) = (&resolved[own.clone()], &surfaces[own]);
-        for pixel in resolved {
+        for (index, (pixel, surface)) in (first..).zip(resolved[own.clone()].iter().zip(&surfaces[own])) {
             invalid += u64::from(pixel.invalid);
             total += u64::from(pixel.samples);
             most = most.max(pixel.samples);
-        }
-        let centres = Centres::of(renderer)?;
-        for (block, first) in (0..resolved.len()).step_by(BLOCK).zip((first..).step_by(BLOCK)) {
-            let block = block..(block + BLOCK).min(resolved.len());
-            let made = resolved[block.clone()].iter().zip(&surfaces[block]);
-            let made = made.map(|(pixel, surface)| values(pixel, &centres.at(surface)));
-            channels.set(first, &made.collect::<Vec<_>>());
+            channels.set(index, pixel, &centre(renderer, &geometry, surface));
         }
         if sums == Sums::Freed {
             renderer.resident = None;
@@ -115,26 +110,21 @@ pub(super) fn whole<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result
     read(renderer, slot, bytes / size_of::<T>())
 }
 
-/// Elements of a slot: in place where the host reads it so, else copied.
-enum Elements<'a, T> {
-    Mapped(&'a Buffer),
-    Copied(Vec<T>),
+/// The same where the host does not read them in place.
+fn copy<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot) -> Result<Option<Vec<T>>> {
+    if renderer.buffer(slot).is_some_and(Buffer::is_mapped) { Ok(None) } else { whole(renderer, slot).map(Some) }
 }
 
-impl<'a, T: bytemuck::Pod> Elements<'a, T> {
-    fn of(renderer: &'a Renderer, slot: Slot) -> Result<Elements<'a, T>> {
-        match renderer.buffer(slot).filter(|buffer| buffer.is_mapped()) {
-            Some(buffer) => Ok(Elements::Mapped(buffer)),
-            None => whole(renderer, slot).map(Elements::Copied),
-        }
-    }
+/// An element of a slot, or of its copy.
+fn element<T: bytemuck::Pod>(renderer: &Renderer, slot: Slot, copy: &Option<Vec<T>>, index: u32) -> T {
+    let in_place = || renderer.buffer(slot).expect("it is mapped").read_one(index as usize);
+    copy.as_ref().map_or_else(in_place, |elements| elements[index as usize])
+}
 
-    fn get(&self, index: u32) -> T {
-        match self {
-            Elements::Mapped(buffer) => buffer.read_one(index as usize),
-            Elements::Copied(elements) => elements[index as usize],
-        }
-    }
+/// Copies of the scene's triangles where there have to be.
+struct Geometry {
+    triangles: Option<Vec<Triangle>>,
+    shadings: Option<Vec<Shading>>,
 }
 
 /// What the middle of a pixel shows.
@@ -148,46 +138,27 @@ struct Centre {
     material: i32,
 }
 
-/// What the middles of pixels are made of.
-struct Centres<'a> {
-    view: &'a View,
-    camera: &'a Camera,
-    frame: Frame,
-    // The device has the geometry already, so the host need not keep it while rendering.
-    triangles: Elements<'a, Triangle>,
-    shadings: Elements<'a, Shading>,
-}
-
-impl<'a> Centres<'a> {
-    fn of(renderer: &'a Renderer) -> Result<Centres<'a>> {
-        let prepared = &renderer.prepared;
-        Ok(Centres {
-            view: &prepared.view,
-            camera: &prepared.camera,
-            frame: renderer.frame,
-            triangles: Elements::of(renderer, Slot::Triangles)?,
-            shadings: Elements::of(renderer, Slot::Shadings)?,
-        })
+fn centre(renderer: &Renderer, geometry: &Geometry, surface: &Surface) -> Centre {
+    if surface.triangle == MISS {
+        return Centre { normal: Vec3::ZERO, position: DVec3::ZERO, depth: 0.0, material: -1 };
     }
-
-    fn at(&self, surface: &Surface) -> Centre {
-        if surface.triangle == MISS {
-            return Centre { normal: Vec3::ZERO, position: DVec3::ZERO, depth: 0.0, material: -1 };
-        }
-        let (triangle, shading) = (self.triangles.get(surface.triangle), self.shadings.get(surface.triangle));
-        let [b1, b2] = surface.barycentric.to_array();
-        let normal = (shading.normal0 * (1.0 - b1 - b2) + shading.normal1 * b1 + shading.normal2 * b2).normalize();
-        let position = surface.position.as_dvec3() / self.frame.scale + self.frame.centre;
-        // Towards the eye, as the kernels turn it.
-        let to = self.view.forward + self.view.perspective * (surface.position - self.view.pivot);
-        let [_, edge1, edge2] = triangle.corner_and_edges();
-        let inner = edge1.cross(edge2).dot(to.as_dvec3()) > 0.0;
-        Centre {
-            normal: if inner { -normal } else { normal },
-            position,
-            depth: (position - self.camera.eye).dot(self.camera.forward),
-            material: shading.material as i32,
-        }
+    let triangle = element(renderer, Slot::Triangles, &geometry.triangles, surface.triangle);
+    let shading = element(renderer, Slot::Shadings, &geometry.shadings, surface.triangle);
+    let [b1, b2] = surface.barycentric.to_array();
+    let normal = (shading.normal0 * (1.0 - b1 - b2) + shading.normal1 * b1 + shading.normal2 * b2).normalize();
+    let frame = renderer.frame;
+    let position = surface.position.as_dvec3() / frame.scale + frame.centre;
+    let camera = &renderer.prepared.camera;
+    // Towards the eye, as the kernels turn it.
+    let view = &renderer.prepared.view;
+    let to = view.forward + view.perspective * (surface.position - view.pivot);
+    let [_, edge1, edge2] = triangle.corner_and_edges();
+    let inner = edge1.cross(edge2).dot(to.as_dvec3()) > 0.0;
+    Centre {
+        normal: if inner { -normal } else { normal },
+        position,
+        depth: (position - camera.eye).dot(camera.forward),
+        material: shading.material as i32,
     }
 }
 
@@ -213,10 +184,6 @@ const NAMES: [&str; 19] = [
     "material.Y",
 ];
 
-/// Pixels whose values are put into the channels at a time: some megabytes, which caches hold.
-const BLOCK: usize = 1 << 14;
-const MOST_CHANNELS: usize = NAMES.len() + VARIANCE.len();
-
 const VARIANCE: [&str; 3] = ["variance.R", "variance.G", "variance.B"];
 
 /// Names of the channels in the order in which they are filled.
@@ -232,37 +199,34 @@ pub fn bytes_per_pixel(has_variance: bool) -> u64 {
 /// The channels in the order in which they are filled.
 struct Channels {
     list: Vec<Channel>,
+    has_variance: bool,
 }
 
 impl Channels {
     fn new(count: usize, has_variance: bool) -> Channels {
         let channel = |name: &'static str| Channel { name: name.into(), data: vec![0.0; count] };
-        Channels { list: names(has_variance).map(channel).collect() }
+        Channels { list: names(has_variance).map(channel).collect(), has_variance }
     }
 
-    /// Sets the pixels from `first` on.
-    fn set(&mut self, first: usize, pixels: &[[f32; MOST_CHANNELS]]) {
-        for (number, channel) in self.list.iter_mut().enumerate() {
-            let data = &mut channel.data[first..first + pixels.len()];
-            data.iter_mut().zip(pixels).for_each(|(value, pixel)| *value = pixel[number]);
+    fn set(&mut self, index: usize, pixel: &Pixel, centre: &Centre) {
+        // Two finite layers may exceed f32 together.
+        let light = (pixel.subsurface + pixel.reflection).min(Vec3::MAX);
+        let position = centre.position.as_vec3();
+        let mut values = Vec::with_capacity(self.list.len());
+        values.extend(light.to_array());
+        values.push(pixel.alpha);
+        values.extend(pixel.subsurface.to_array());
+        values.extend(pixel.reflection.to_array());
+        values.extend(centre.normal.to_array());
+        values.extend(position.to_array());
+        values.extend([centre.depth as f32, pixel.samples as f32, centre.material as f32]);
+        if self.has_variance {
+            values.extend(pixel.variance.to_array());
+        }
+        for (channel, value) in self.list.iter_mut().zip(values) {
+            channel.data[index] = value;
         }
     }
-}
-
-/// A pixel's values in the order of [`NAMES`], then [`VARIANCE`].
-fn values(pixel: &Pixel, centre: &Centre) -> [f32; MOST_CHANNELS] {
-    // Two finite layers may exceed f32 together.
-    let light = (pixel.subsurface + pixel.reflection).min(Vec3::MAX);
-    let of_centre = [centre.normal, centre.position.as_vec3()];
-    let mut values = [0.0; MOST_CHANNELS];
-    values[..3].copy_from_slice(&light.to_array());
-    values[3] = pixel.alpha;
-    for (at, vector) in (4..).step_by(3).zip([pixel.subsurface, pixel.reflection].into_iter().chain(of_centre)) {
-        values[at..at + 3].copy_from_slice(&vector.to_array());
-    }
-    values[16..19].copy_from_slice(&[centre.depth as f32, pixel.samples as f32, centre.material as f32]);
-    values[19..].copy_from_slice(&pixel.variance.to_array());
-    values
 }
 
 /// The settings that must agree between parts of one image; the seed stands apart.

@@ -107,7 +107,7 @@ constants! {
     MODEL_LAMBERT: u32 = 5;
     /// Bits of an f32 below those that number a cell of a tabulated profile.
     TABLE_SHIFT: u32 = 21;
-    /// Numbers before a table's values at each curvature.
+    /// Vectors before a table's values at each curvature.
     TABLE_HEADER: u32 = 4;
     /// Most halvings in the search of a distribution function, for at most 500 cells.
     TABLE_HALVINGS: u32 = 9;

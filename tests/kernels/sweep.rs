@@ -10,12 +10,11 @@ use rayon::prelude::*;
 use serde_json::json;
 use translucent::{
     Normalisation, Projection, Settings,
-    prepare::SET_DIAMETER,
     reference::{
         self, Inputs,
         accumulate::accumulate,
         primary::primary,
-        profile::{self, Coefficients, Options},
+        profile::{self, Coefficients, Options, SET_DIAMETER},
         random::{hash, unit},
         reflect::reflect,
         reproject::reproject,

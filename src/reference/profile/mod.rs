@@ -33,7 +33,6 @@ pub use table::Tabulated;
 
 use super::boundary::{Side, diffuse_reflectance};
 use super::rough::Rough;
-use crate::prepare::SET_DIAMETER;
 use crate::scene::{LengthKind, Medium};
 use crate::settings::{self, Model, Normalisation};
 use crate::shared::{
@@ -303,6 +302,10 @@ pub fn draw_radius(matter: Matter, u_component: f64, u_radius: f64) -> f64 {
     }
     Profile::unpack(matter, component / COMPONENTS).radius(component % COMPONENTS, share, u_radius)
 }
+
+/// No two points of a set are farther apart: the frame gives translucent geometry the radius 1. Nothing is missed, and a
+/// probe that runs within a triangle's plane meets no rounding of its distance that looks like a hit far away.
+pub const SET_DIAMETER: f32 = 2.000_01;
 
 /// Of an equal share, what each channel's probability is at least: bounds the variance of any channel at four times that of
 /// equal shares.
