@@ -29,7 +29,11 @@ use crate::reference::profile::table::Local;
 use crate::reference::walk::mesh::Corners;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::f64::consts::{FRAC_PI_3, TAU};
+use std::{
+    f64::consts::{FRAC_PI_3, TAU},
+    iter::Sum,
+    ops::{Add, Mul, Sub},
+};
 
 /// Radius of a group over its distance below which its centre stands for it.
 pub const OPENING: f64 = 0.4;
@@ -154,10 +158,14 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// The integral over one triangle of a profile, of which `inside` is the mass within a squared distance.
-pub fn triangle(inside: &impl Fn(f64) -> DVec3, point: DVec3, corners: &Corners) -> DVec3 {
+/// Numbers of several profiles, which are integrated together.
+pub trait Profiles: Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self> + Sum {}
+impl<V: Copy + Default + Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V> + Sum> Profiles for V {}
+
+/// The integral over one triangle of profiles, of which `inside` is the mass within a squared distance.
+pub fn triangle<V: Profiles>(inside: &impl Fn(f64) -> V, point: DVec3, corners: &Corners) -> V {
     let [a, b, c] = *corners;
-    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return DVec3::ZERO };
+    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return V::default() };
     let height = (point - a).dot(normal);
     let foot = point - height * normal;
     let squared = height * height;
@@ -168,7 +176,7 @@ pub fn triangle(inside: &impl Fn(f64) -> DVec3, point: DVec3, corners: &Corners)
         // Distance of the foot from the edge's line, positive inside.
         let away = normal.dot(along.cross(foot - from));
         if away == 0.0 {
-            return DVec3::ZERO;
+            return V::default();
         }
         let angle = |w: DVec3| (w.dot(along) / away.abs()).atan();
         let (begin, end) = (angle(u), angle(v));
@@ -176,20 +184,20 @@ pub fn triangle(inside: &impl Fn(f64) -> DVec3, point: DVec3, corners: &Corners)
             let rho = away / phi.cos();
             inside(squared + rho * rho) - within
         });
-        part * away.signum() / TAU
+        part * (away.signum() / TAU)
     };
     edge(a, b) + edge(b, c) + edge(c, a)
 }
 
 /// Four-point Gauss-Legendre quadrature in panels of at most sixty degrees.
-fn integral(begin: f64, end: f64, f: impl Fn(f64) -> DVec3) -> DVec3 {
+fn integral<V: Profiles>(begin: f64, end: f64, f: impl Fn(f64) -> V) -> V {
     const RULE: [(f64, f64); 2] =
         [(0.339_981_043_584_856_26, 0.652_145_154_862_546_1), (0.861_136_311_594_052_6, 0.347_854_845_137_453_85)];
     let panels = ((end - begin) / FRAC_PI_3).ceil().max(1.0);
     let half = (end - begin) / panels / 2.0;
     let panel = |i: usize| {
         let middle = begin + (2 * i + 1) as f64 * half;
-        RULE.iter().map(|(x, w)| *w * (f(middle - half * x) + f(middle + half * x))).sum::<DVec3>()
+        RULE.iter().map(|(x, w)| (f(middle - half * x) + f(middle + half * x)) * *w).sum::<V>()
     };
-    half * (0..panels as usize).map(panel).sum::<DVec3>()
+    (0..panels as usize).map(panel).sum::<V>() * half
 }

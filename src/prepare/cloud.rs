@@ -14,7 +14,7 @@ use crate::{
     settings::{Cloud, Settings},
     shared::{Cluster, MODEL_DIRECTIONAL, MODEL_LAMBERT, MODEL_TABLE, Material, Triangle},
 };
-use glam::{DVec3, Vec3, vec2};
+use glam::{DVec3, DVec4, Vec3, vec2};
 use rayon::prelude::*;
 use std::{
     collections::{BinaryHeap, HashMap},
@@ -150,15 +150,15 @@ fn lattice(count: usize) -> Vec<(f64, f64)> {
     if inside.is_empty() { vec![(1.0 / 3.0, 1.0 / 3.0); count.min(1)] } else { inside }
 }
 
-/// The integral of a profile, of which `inside` is the mass within a squared distance up to `reach`, over the surface that
+/// The integral of profiles, of which `inside` is the mass within a squared distance up to `reach`, over the surface that
 /// faces as a point does.
-fn facing(tree: &Tree, point: &Cluster, reach: f64, inside: impl Fn(f64) -> DVec3) -> DVec3 {
+fn facing(tree: &Tree, point: &Cluster, reach: f64, inside: impl Fn(f64) -> DVec4) -> DVec4 {
     let (place, normal) = (point.position.as_dvec3(), point.normal.as_dvec3());
     let part = |corners: &Corners| {
         let [a, b, c] = *corners;
         let twice = (b - a).cross(c - a);
         if twice.dot(normal) <= 0.0 {
-            return DVec3::ZERO;
+            return DVec4::ZERO;
         }
         let middle = (a + b + c) / 3.0;
         let squared = middle.distance_squared(place);
@@ -226,21 +226,21 @@ fn neighbours(points: &[Cluster], reach: f64, weight: impl Fn(f64) -> f64 + Sync
 /// Rounds in which areas are evened out.
 const ROUNDS: usize = 8;
 
+/// Mass of the near weight (1 - r^2 / reach^2)^2 within a squared distance.
+fn near_area(squared: f64, reach: f64) -> f64 {
+    let rest = 1.0 - (squared / (reach * reach)).min(1.0);
+    PI / 3.0 * reach * reach * (1.0 - rest.powi(3))
+}
+
 /// Changes the areas that the points of a set stand for until those within the near weight of each have together what the
-/// surface has there: they are not as far apart everywhere.
-fn even_out(tree: &Tree, reach: f64, points: &mut [Cluster]) {
-    let w = |squared: f64| (1.0 - (squared / (reach * reach)).min(1.0)).powi(2);
-    let inside = |squared: f64| {
-        let rest = 1.0 - (squared / (reach * reach)).min(1.0);
-        DVec3::splat(PI / 3.0 * reach * reach * (1.0 - rest.powi(3)))
-    };
-    let neighbours = neighbours(points, reach, w);
-    let wanted: Vec<f64> = points.par_iter().map(|point| facing(tree, point, reach, inside).x).collect();
+/// surface has there, `wanted`: they are not as far apart everywhere.
+fn even_out(reach: f64, points: &mut [Cluster], wanted: impl Fn(usize) -> f64) {
+    let neighbours = neighbours(points, reach, |squared| (1.0 - (squared / (reach * reach)).min(1.0)).powi(2));
     let mut areas: Vec<f64> = points.iter().map(|point| f64::from(point.area)).collect();
     for _ in 0..ROUNDS {
         let found =
             neighbours.iter().map(|near| near.iter().map(|&(other, weight)| weight * areas[other]).sum::<f64>());
-        let shares: Vec<f64> = wanted.iter().zip(found).map(|(wanted, found)| wanted / found).collect();
+        let shares: Vec<f64> = found.enumerate().map(|(index, found)| wanted(index) / found).collect();
         areas.iter_mut().zip(shares).for_each(|(area, share)| *area *= share);
     }
     points.iter_mut().zip(areas).for_each(|(point, area)| point.area = area as f32);
@@ -252,20 +252,24 @@ fn weigh(scene: &Scene, material: &Material, profiles: &[Vec3], thickness: &[Vec
     let own = scene.triangles.iter().filter(|triangle| triangle.set == set);
     let corners: Vec<Corners> = own.map(curvature::corners).collect();
     let tree = Tree::new(&corners);
-    even_out(&tree, material.reach.into(), points);
     let reach = f64::from(material.reach);
     let near = |curvature: f64| Near::new(Matter { material, tables: profiles, curvature }, reach);
     let flat = near(0.0);
-    points.par_iter_mut().for_each(|point| {
+    // Near masses over the area, and the area within the near weight.
+    let of = |point: &Cluster| {
         let curvature = thickness.get(point.triangle as usize).map_or(0.0, |at| {
             let [b1, b2] = point.barycentric.to_array();
             at.dot(Vec3::new(1.0 - b1 - b2, b1, b2))
         });
         let curved = (material.model == MODEL_TABLE && curvature > 0.0).then(|| near(curvature.into()));
         let near = curved.as_ref().unwrap_or(&flat);
-        let mass = facing(&tree, point, reach, |squared| near.inside(squared));
-        point.mass = (f64::from(point.area) * mass).as_vec3();
-    });
+        facing(&tree, point, reach, |squared| near.inside(squared).extend(near_area(squared, reach)))
+    };
+    let masses: Vec<DVec4> = points.par_iter().map(of).collect();
+    even_out(reach, points, |index| masses[index].w);
+    for (point, mass) in points.iter_mut().zip(masses) {
+        point.mass = (f64::from(point.area) * mass.truncate()).as_vec3();
+    }
 }
 
 /// A tree of nodes with as many points on either side, one more or less; places without a point come second.
