@@ -17,6 +17,11 @@ SURFACES(readonly);
 CLUSTERS(readonly);
 GATHERS(read_write);
 
+// The next node in order that is not below node j.
+uint after(uint j) {
+    return (j + 1u) >> findLSB(j + 1u);
+}
+
 void main() {
     uint index = active_pixel();
     if (index >= step_.pixel_count) return;
@@ -44,21 +49,28 @@ void main() {
     if (step_.first == 0u) sum = gathers[index];
     // j is the place in the tree below the step's node, of which that node is number 1.
     uint j = 1u;
-    do {
-        uint node = ((step_.node - 1u) << findMSB(j)) + j;
-        vec3 to = clusters[node].position - s.position;
-        float r2 = dot(to, to);
-        float r = sqrt(r2);
-        float radius = clusters[node].radius;
-        uint of = clusters[node].set;
-        bool useful = clusters[node].area > 0.0 && (of == set || of == SEVERAL) && r - radius <= m.radius_max;
-        bool leaf = node >= view.leaves;
-        bool stands = leaf || of != SEVERAL && radius < view.opening * r;
-        if (useful && !stands) {
-            j = 2u * j;
-            continue;
+    bool left = true;
+    while (left) {
+        // On to the next node whose points count together, or that is one.
+        uint node = 0u;
+        vec3 to = vec3(0.0);
+        float r2 = 0.0;
+        bool stands = false;
+        while (left && !stands) {
+            node = ((step_.node - 1u) << findMSB(j)) + j;
+            to = clusters[node].position - s.position;
+            r2 = dot(to, to);
+            float r = sqrt(r2);
+            float radius = clusters[node].radius;
+            uint of = clusters[node].set;
+            bool useful = clusters[node].area > 0.0 && (of == set || of == SEVERAL) && r - radius <= m.radius_max;
+            stands = useful && (node >= view.leaves || of != SEVERAL && radius < view.opening * r);
+            if (!stands) {
+                j = useful ? 2u * j : after(j);
+                left = j != 1u;
+            }
         }
-        if (useful) {
+        if (stands) {
             float spread = clusters[node].spread;
             float across = dot(clusters[node].normal, to);
             float apart = sqrt(2.0 * spread * max(r2 - across * across, 0.0));
@@ -67,7 +79,7 @@ void main() {
             vec3 flux = clusters[node].flux;
             if (has_model(m, MODEL_TABLE)) flux += slope * clusters[node].oblique;
             float near = 0.0;
-            if (r < m.reach && dot(clusters[node].normal, s.normal) * s.side > 0.0) {
+            if (r2 < m.reach * m.reach && dot(clusters[node].normal, s.normal) * s.side > 0.0) {
                 near = 1.0 - r2 / (m.reach * m.reach);
                 near *= near;
                 sum.near += near * value * flux;
@@ -75,10 +87,10 @@ void main() {
                 sum.mass += near * value * clusters[node].mass;
             }
             sum.far += (1.0 - near) * value * flux;
+            j = after(j);
+            left = j != 1u;
         }
-        // The next in order that is not below this one.
-        j = (j + 1u) >> findLSB(j + 1u);
-    } while (j != 1u);
+    }
 
     if (step_.last == 0u) {
         gathers[index] = sum;

@@ -36,9 +36,9 @@ vec3 shape(Material m, float r2) {
     return shape_shifted(m, r2, 0.0);
 }
 
-// As `shape`, in the mean over u: a table is read in one place, at the curvature that `table_draw` drew.
-vec3 shape_drawn(Material m, float r2, float u) {
-    if (has_model(m, MODEL_TABLE)) return table_drawn(m, r2, u);
+// As `shape`, of a table at the curvature that `table_draw` drew.
+vec3 shape_drawn(Material m, float r2) {
+    if (has_model(m, MODEL_TABLE)) return table_drawn(m, r2);
     return shape(m, r2);
 }
 

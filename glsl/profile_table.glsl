@@ -11,7 +11,7 @@ vec2 table_bend = vec2(0.0);
 float table_scale = 0.0;
 
 uint table_base(Material m, uint node) {
-    return m.table + node * (TABLE_HEADER + 2u * (m.table_cells + 1u));
+    return m.table + node * (TABLE_HEADER + 2u * m.table_cells + 1u);
 }
 
 // Chooses the curvatures at the surface that is seen.
@@ -49,17 +49,23 @@ float table_bent(float r2, float bend, out float area) {
     return q <= 1.0 ? r2 * over * over : 0.0;
 }
 
-// The channels' values at one curvature.
-vec3 table_value(Material m, uint node, float r2) {
-    uint base = table_base(m, node);
+// Values between the two nodes of a cell, t from the first to the second.
+vec3 table_inside(vec3 cell, float t) {
+    uvec3 bits = floatBitsToUint(cell);
+    uint most = (1u << TABLE_BITS) - 1u;
+    vec3 low = vec3(bits >> (TABLE_BITS - 1u) & (most - 1u) | bits >> 31), high = vec3(bits & most);
+    return uintBitsToFloat(bits & 0x7f800000u) * mix(low, high, t);
+}
+
+// The channels' values at the curvature whose numbers begin at `base`; no cell that it does not reach has any.
+vec3 table_value(Material m, uint base, float r2) {
     uint cell = floatBitsToUint(r2) >> TABLE_SHIFT;
-    bool before = cell < m.table_first;
-    if (!before && cell - m.table_first >= uint(profiles[base].y)) return vec3(0.0);
+    if (cell >= m.table_first + m.table_cells) return vec3(0.0);
     float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
-    // The value below the first node stands before that of the node.
-    uint i = base + TABLE_HEADER + cell - m.table_first;
-    i = before ? base + TABLE_HEADER - 1u : i;
-    return mix(profiles[i], profiles[before ? i : i + 1u], before ? 0.0 : (r2 - low) / (high - low));
+    // The value below the first node stands before the first cell.
+    bool before = cell < m.table_first;
+    uint i = before ? 0u : cell + 1u - m.table_first;
+    return table_inside(profiles[base + TABLE_HEADER - 1u + i], before ? 0.0 : (r2 - low) / (high - low));
 }
 
 // Values between the two curvatures. Those of a density are divided by their masses.
@@ -72,8 +78,9 @@ vec3 table_between(Material m, float r2, bool density) {
         if (weight > 0.0) {
             float area;
             float bent = table_bent(r2, table_bend[k], area);
-            vec3 value = weight * area * table_value(m, table_node + k, bent);
-            sum += density ? value * profiles[table_base(m, table_node + k) + 1u] : value;
+            uint base = table_base(m, table_node + k);
+            vec3 value = weight * area * table_value(m, base, bent);
+            sum += density ? value * profiles[base + 1u] : value;
         }
         weight = 1.0 - table_weight;
     } while (++k < (CURVATURE != 0 ? 2u : 1u));
@@ -88,9 +95,9 @@ vec3 table_shape(Material m, float r2, float shift) {
         f.z > 0.0 ? exp_(log_(f.z) + shift) : 0.0);
 }
 
-// Density of the radius per area of the plane. The half-space's mass is 1.
+// Density of the radius per area of the plane.
 float table_density(Material m, float r2) {
-    return dot(m.density, table_between(m, r2, CURVATURE != 0));
+    return dot(m.density, table_between(m, r2, true));
 }
 
 // The distance that is bent to a squared distance.
@@ -99,31 +106,22 @@ float table_unbent(float s, float bend) {
     return 2.0 * sqrt(s) / (1.0 + sqrt(max(1.0 - 4.0 * bend * table_scale * s, 0.0)));
 }
 
-// The one of the two curvatures that `table_drawn` reads: its first value, the cells that it reaches, how distances bend.
-uint table_values = 0u;
-uint table_reached = 0u;
+// The one of the two curvatures that `table_drawn` reads: where its numbers begin, how distances bend.
+uint table_drawn_base = 0u;
 float table_drawn_bend = 0.0;
 
 // Draws it by their weights.
 void table_draw(Material m, float u) {
     uint second = CURVATURE != 0 && u >= table_weight ? 1u : 0u;
-    uint base = table_base(m, table_node + second);
-    table_values = base + TABLE_HEADER;
-    table_reached = uint(profiles[base].y);
+    table_drawn_base = table_base(m, table_node + second);
     table_drawn_bend = table_bend[second];
 }
 
-// One of the node's two values around the squared distance, drawn by their weights.
-vec3 table_drawn(Material m, float r2, float u) {
+// Its values.
+vec3 table_drawn(Material m, float r2) {
     float area;
     float bent = table_bent(r2, table_drawn_bend, area);
-    uint cell = floatBitsToUint(bent) >> TABLE_SHIFT;
-    float low = uintBitsToFloat(cell << TABLE_SHIFT), high = uintBitsToFloat((cell + 1u) << TABLE_SHIFT);
-    bool before = cell < m.table_first;
-    uint i = before ? 0u : cell - m.table_first;
-    if (!before && i >= table_reached) return vec3(0.0);
-    i = table_values + i + (u * (high - low) < bent - low ? 1u : 0u);
-    return area * profiles[before ? table_values - 1u : i];
+    return area * table_value(m, table_drawn_base, bent);
 }
 
 // Squared distance beyond which both curvatures have no light.
@@ -151,9 +149,8 @@ float table_radius(Material m, float u_component, float u) {
     float share = (u_component - start) / (m.component_cdf[3u * c] - start);
     bool second = CURVATURE != 0 && table_weight < 1.0 && share >= table_weight;
     uint base = table_base(m, table_node + (second ? 1u : 0u));
-    uint nodes = m.table_cells + 1u;
-    uint values = base + TABLE_HEADER;
-    uint within = values + nodes;
+    uint cells = base + TABLE_HEADER;
+    uint within = cells + m.table_cells;
     uint low = 0u, high = uint(profiles[base].y);
     float target = u * profiles[within + high][c];
     float bend = second ? table_bend.y : table_bend.x;
@@ -168,7 +165,8 @@ float table_radius(Material m, float u_component, float u) {
     }
     float s0 = uintBitsToFloat((m.table_first + low) << TABLE_SHIFT);
     float width = uintBitsToFloat((m.table_first + low + 1u) << TABLE_SHIFT) - s0;
-    float a = profiles[values + low][c], b = profiles[values + low + 1u][c];
+    vec3 cell = profiles[cells + low];
+    float a = table_inside(cell, 0.0)[c], b = table_inside(cell, 1.0)[c];
     float q = (target - profiles[within + low][c]) / (PI * width);
     float root = a + sqrt(max(a * a + 2.0 * (b - a) * q, 0.0));
     float t = root > 0.0 ? min(2.0 * q / root, 1.0) : 0.0;

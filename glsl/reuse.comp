@@ -35,7 +35,6 @@ void main() {
         table_of(probes[index]);
         table_draw(m, unit(hash(key)));
     }
-    uint turn = hash(key + 1u);
     float reach2 = uintBitsToFloat(probes[index].seat.w), own_r2 = probes[index].hit_r2;
     vec3 sum = vec3(0.0);
     Tile tile = tile_of(view, place_of(view, index, batch), batch);
@@ -46,13 +45,12 @@ void main() {
         [[dont_unroll]] do {
             bool there = in_band(tile, at);
             uint other = there ? row + at.x : index;
-            turn += there ? GOLDEN : 0u;
             uvec4 lit = probes[other].lit;
             vec3 light = uintBitsToFloat(lit.xyz);
             if (there && lit.w == share && light != vec3(0.0)) {
                 vec3 delta = probes[other].hit - surface.position;
                 float r2 = other == index ? own_r2 : dot(delta, delta);
-                if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2, unit(turn));
+                if (other == index || r2 <= reach2) sum += light * shape_drawn(m, r2);
             }
         } while (++at.x < REUSE);
         row += view.crop_width;

@@ -91,8 +91,10 @@ const uint MODEL_TABLE = 4u;
 const uint MODEL_LAMBERT = 5u;
 // Bits of an f32 below those that number a cell of a tabulated profile.
 const uint TABLE_SHIFT = 21u;
-// Vectors before a table's values at each curvature.
+// Vectors before a table's cells at each curvature.
 const uint TABLE_HEADER = 4u;
+// Bits of each of the two values of a table's cell.
+const uint TABLE_BITS = 12u;
 // Most halvings in the search of a distribution function, for at most 500 cells.
 const uint TABLE_HALVINGS = 9u;
 // Most curvatures of a table.

@@ -23,10 +23,9 @@
 //! over an area is no better than it was.
 //!
 //! # Reading tables
-//! A tabulated f_i is a mean of values: of two curvatures by their weights, of two nodes of the distance by theirs. One of
-//! each is drawn (as textures may be: M. Fajardo, B. Wronski, M. Salvi, M. Pharr, "Stochastic texture filtering" (2023)):
-//! the curvature once for a pixel and sample, the node for each hit by numbers u_n = u_0 + n / golden ratio, which cover
-//! [0, 1) evenly. The expectation is the same, with a quarter of the reads.
+//! A tabulated f_i is the mean of those of two curvatures by their weights. One is drawn for a pixel and sample, as textures
+//! may be (M. Fajardo, B. Wronski, M. Salvi, M. Pharr, "Stochastic texture filtering" (2023)): the expectation is the same,
+//! with half of the reads.
 
 use super::Inputs;
 use super::accumulate::{Entry, choose, entering_light, keeps_light, kept_light, leaving};
@@ -38,7 +37,7 @@ use super::random::{batch, hash, key, unit};
 use super::shared_hit::{reach, sharing, tile_share};
 use super::sums::Contribution;
 use super::tile::{Place, first_share, members};
-use crate::shared::{BATCHES, DIM_REUSE, GOLDEN, Hits, MODEL_LAMBERT, Probe, Step, Surface};
+use crate::shared::{BATCHES, DIM_REUSE, Hits, MODEL_LAMBERT, Probe, Step, Surface};
 use glam::{DVec3, UVec4};
 
 /// What the pixels of a band see and probe in a sample.
@@ -118,9 +117,9 @@ pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage) -> Contrib
     let (px, py) = position(inputs.view, step, index);
     let key = key(inputs.view.seed, px, py, batch(step.sample_index), DIM_REUSE);
     let key = key.wrapping_add(hash(step.sample_index / BATCHES));
-    let (node, first) = (unit(hash(key)), hash(key.wrapping_add(1)));
+    let u = unit(hash(key));
     let sharing = sharing(inputs, step, stage, index);
-    let of = |(n, other): (u32, u32)| {
+    let of = |other: u32| {
         if !sharing.contains(&other) {
             return DVec3::ZERO;
         }
@@ -129,11 +128,9 @@ pub fn reuse(inputs: &Inputs, step: &Step, index: u32, stage: &Stage) -> Contrib
         let own = other == index;
         let r = if own { f64::from(hit_r2).sqrt() } else { hit.as_dvec3().distance(stage.position(index)) };
         let reached = own || r <= reach(matter);
-        let u = unit(first.wrapping_add(GOLDEN.wrapping_mul(n)));
-        if reached { probe.light().as_dvec3() * shapes_drawn(matter, r, node, u) } else { DVec3::ZERO }
+        if reached { probe.light().as_dvec3() * shapes_drawn(matter, r, u) } else { DVec3::ZERO }
     };
-    let members = members(inputs, step, Place::of(inputs, step, index));
-    let sum: DVec3 = (1..).zip(members).map(of).sum();
+    let sum: DVec3 = members(inputs, step, Place::of(inputs, step, index)).into_iter().map(of).sum();
     Contribution::of(
         leaving(inputs, matter, matter, &seen(inputs, surface), surface) * matter.material.strength.as_dvec3() * sum,
     )

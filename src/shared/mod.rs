@@ -107,8 +107,10 @@ constants! {
     MODEL_LAMBERT: u32 = 5;
     /// Bits of an f32 below those that number a cell of a tabulated profile.
     TABLE_SHIFT: u32 = 21;
-    /// Vectors before a table's values at each curvature.
+    /// Vectors before a table's cells at each curvature.
     TABLE_HEADER: u32 = 4;
+    /// Bits of each of the two values of a table's cell.
+    TABLE_BITS: u32 = 12;
     /// Most halvings in the search of a distribution function, for at most 500 cells.
     TABLE_HALVINGS: u32 = 9;
     /// Most curvatures of a table.

@@ -56,7 +56,9 @@ mutants! {
     "profile_better.glsl", "index", "profile.better": "sources + m.fluence * line" => "sources + m.fluence.x * line";
     "profile_burley.glsl", "constant", "profile.burley": "shift - x * (1.0 / 3.0)" => "shift - x * (1.0 / 2.0)";
     "profile_directional.glsl", "sign", "profile.directional": "w_no - 2.0 * w_n * n_no" => "w_no + 2.0 * w_n * n_no";
-    "profile_table.glsl", "swapped", "profile.table": "mix(profiles[i], profiles[before ? i : i + 1u]," => "mix(profiles[before ? i : i + 1u], profiles[i],";
+    "profile_table.glsl", "swapped", "profile.table": "mix(low, high, t)" => "mix(high, low, t)";
+    "profile_table.glsl", "off by one", "profile.table": "before ? 0u : cell + 1u" => "before ? 0u : cell";
+    "profile_table.glsl", "lost term", "profile.table": "(most - 1u) | bits >> 31" => "(most - 1u)";
     "profile.glsl", "swapped branch", "profile.lambert":
         "table_obliqueness(m, m.slope, c, leaving)" => "table_obliqueness(m, m.slope, c, !leaving)";
     "mixture.glsl", "index", "profile.mixture": "x - float(k)" => "x - float(k + 1u)";
@@ -111,8 +113,6 @@ mutants! {
     "shared_hit.glsl", "lost condition", "kernel.accumulate": "if (other == index || r2 <= seat.w) sum" => "sum";
     "sample.comp", "lost term", "kernel.sample": "probe.lit = uvec4(0u);" => "";
     "reuse.comp", "index", "kernel.reuse": "probes[other].hit - surface.position" => "probes[index].hit - surface.position";
-    "profile_table.glsl", "swapped branch", "kernel.reuse": "u * (high - low) < bent - low ? 1u : 0u" =>
-        "u * (high - low) < bent - low ? 0u : 1u";
     "profile_table.glsl", "lost condition", "kernel.reuse": "CURVATURE != 0 && u >= table_weight ? 1u : 0u" => "0u";
     "reuse.comp", "lost condition", "kernel.reuse": "there && lit.w == share && " => "there && ";
     "tile.glsl", "off by one", "kernel.accumulate": "lessThan(tile.first + at, tile.end)" => "lessThanEqual(tile.first + at, tile.end)";

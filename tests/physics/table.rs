@@ -1,7 +1,8 @@
 //! The tabulated profile: against independent simulations, its sampler, its store.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, SQRT_2};
+
 use translucent::reference::boundary::{Side, diffuse_reflectance};
 use translucent::reference::math::integrate;
 use translucent::reference::profile::{
@@ -11,6 +12,7 @@ use translucent::settings::Directional;
 use translucent::settings::Normalisation;
 use translucent::shared::MODEL_TABLE;
 use translucent::table::{
+    block::{pack, unpack},
     cache,
     single::Matter as Single,
     store,
@@ -307,4 +309,20 @@ fn cache_keeps_tables_and_survives_what_is_not_one() {
     let _ = std::fs::remove_dir_all(&folder);
     // A folder that cannot be made costs the cache alone.
     assert!(cache::table(Some(std::path::Path::new("/dev/null/none")), ior, g, walks) == tables[0]);
+}
+
+/// Two values in one f32: off by 1/4095 of the larger at most, and a number that no device takes for another.
+#[test]
+fn cells_keep_two_values() {
+    let magnitudes = [0.0, 1e-45, 1e-30, 3e-7, 1.0 - 1e-9, 1.0, 4094.6, 4095.0, 4095.9, 1e20];
+    for low in magnitudes {
+        for high in magnitudes.into_iter().flat_map(|x| [x, low * 0.9999, low / 3.0]) {
+            let values = DVec2::new(low, high);
+            let cell = pack(values);
+            assert!(cell.is_normal(), "{values}: {cell:e}");
+            // Below what the least exponent resolves, values are 0.
+            let bound = (values.max_element() / 4095.0).max(f64::from(f32::MIN_POSITIVE));
+            assert!((unpack(cell) - values).abs().max_element() <= bound, "{values}: {}", unpack(cell));
+        }
+    }
 }

@@ -267,10 +267,9 @@ pub fn shapes(matter: Matter, r: f64) -> DVec3 {
     shapes_shifted(matter, r, 0.0)
 }
 
-/// shape(r) of the three channels in the mean over u of [0, 1)^2: of a table one curvature, drawn by `node`, and one node
-/// of the distance, drawn by `u`.
-pub fn shapes_drawn(matter: Matter, r: f64, node: f64, u: f64) -> DVec3 {
-    if matter.material.model == MODEL_TABLE { table::drawn(matter, r, node, u) } else { shapes(matter, r) }
+/// shape(r) of the three channels in the mean over u of [0, 1): of a table that of one curvature, drawn by it.
+pub fn shapes_drawn(matter: Matter, r: f64, u: f64) -> DVec3 {
+    if matter.material.model == MODEL_TABLE { table::drawn(matter, r, u) } else { shapes(matter, r) }
 }
 
 /// Density of the sampled radii per area of the plane.

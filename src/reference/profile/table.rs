@@ -19,7 +19,7 @@ use crate::reference::boundary::cos_refracted;
 use crate::shared::Material;
 use crate::table::{
     self,
-    block::{Block, HEADER},
+    block::{Block, HEADER, unpack},
     grid,
 };
 use glam::{DVec2, DVec3, Vec3};
@@ -58,10 +58,16 @@ struct Node<'a> {
     /// 1 / mass, and k, of the channels.
     densities: DVec3,
     slope: DVec3,
-    /// Values below the first node.
-    inner: DVec3,
-    values: &'a [Vec3],
+    /// Values below the first node, as a cell.
+    below: Vec3,
+    cells: &'a [Vec3],
     within: &'a [Vec3],
+}
+
+/// The values of the channels at both nodes of a cell.
+fn ends(cell: Vec3) -> [DVec3; 2] {
+    let [x, y, z] = cell.to_array().map(unpack);
+    [DVec3::new(x.x, y.x, z.x), DVec3::new(x.y, y.y, z.y)]
 }
 
 impl<'a> Node<'a> {
@@ -74,15 +80,15 @@ impl<'a> Node<'a> {
 
     fn new(first: u32, data: &'a [Vec3]) -> Node<'a> {
         let (header, nodes) = data.split_at(HEADER);
-        let (values, within) = nodes.split_at(nodes.len() / 2);
+        let (cells, within) = nodes.split_at(nodes.len() / 2);
         Node {
             first,
             curvature: header[0].x.into(),
             reached: header[0].y as usize,
             densities: header[1].as_dvec3(),
             slope: header[2].as_dvec3(),
-            inner: header[3].as_dvec3(),
-            values,
+            below: header[3],
+            cells,
             within,
         }
     }
@@ -108,8 +114,11 @@ impl<'a> Node<'a> {
 
     fn values_in(&self, place: Place) -> DVec3 {
         match place {
-            Place::Before(_) => self.inner,
-            Place::Cell { i, t, .. } => self.values[i].as_dvec3().lerp(self.values[i + 1].as_dvec3(), t),
+            Place::Before(_) => ends(self.below)[0],
+            Place::Cell { i, t, .. } => {
+                let [low, high] = ends(self.cells[i]);
+                low.lerp(high, t)
+            }
             Place::Beyond => DVec3::ZERO,
         }
     }
@@ -123,7 +132,7 @@ impl<'a> Node<'a> {
         }
         let i = self.within[..self.reached].partition_point(|light| f64::from(light[c]) <= target) - 1;
         let [low, high] = [0, 1].map(|k| f64::from(grid::node(self.first + i as u32 + k)));
-        let [a, b] = [i, i + 1].map(|i| f64::from(self.values[i][c]));
+        let [a, b] = unpack(self.cells[i][c]).to_array();
         // Light from the edge over the cell's area: a t + (b - a) t^2 / 2.
         let q = (target - within(i)) / (PI * (high - low));
         let root = a + (a * a + 2.0 * (b - a) * q).max(0.0).sqrt();
@@ -140,7 +149,7 @@ impl<'a> Node<'a> {
         match place {
             Place::Before(share) => self.within[0].as_dvec3() * share,
             Place::Cell { i, past, .. } => {
-                let mean = (self.values[i].as_dvec3() + self.values_in(place)) / 2.0;
+                let mean = (ends(self.cells[i])[0] + self.values_in(place)) / 2.0;
                 self.within[i].as_dvec3() + PI * past * mean
             }
             Place::Beyond => self.total(),
@@ -244,16 +253,12 @@ pub(super) fn shapes(matter: Matter, r: f64) -> DVec3 {
     parts(matter).iter().map(|part| part.values(matter, r)).sum()
 }
 
-/// One value of the curvature that `node` draws, the one that u draws of the two around the distance.
-pub(super) fn drawn(matter: Matter, r: f64, node: f64, u: f64) -> DVec3 {
+/// The values of the curvature that the number draws.
+pub(super) fn drawn(matter: Matter, r: f64, u: f64) -> DVec3 {
     let parts = parts(matter);
-    let part = &parts[usize::from(node >= parts[0].weight)];
+    let part = &parts[usize::from(u >= parts[0].weight)];
     let (s, area) = part.bent(r * r);
-    let node = Node::of(matter, part.node);
-    area * match node.place(s) {
-        Place::Cell { i, t, .. } => node.values[i + usize::from(u < t)].as_dvec3(),
-        place => node.values_in(place),
-    }
+    area * Node::of(matter, part.node).values(s)
 }
 
 /// Density of the sampled radii per area of the plane.
@@ -390,7 +395,7 @@ impl Radial for Tabulated {
             crate::reference::math::integrate(a, b, panels, |r| 2.0 * PI * r * self.shape(r) * bessel(k * r))
         };
         let edge = |i: usize| f64::from(grid::node(self.first + i as u32)).sqrt();
-        ring(0.0, edge(0)) + (1..self.node().values.len()).map(|i| ring(edge(i - 1), edge(i))).sum::<f64>()
+        ring(0.0, edge(0)) + (1..self.node().within.len()).map(|i| ring(edge(i - 1), edge(i))).sum::<f64>()
     }
 
     fn radius(&self, _component: usize, _share: f64, u: f64) -> f64 {
