@@ -28,8 +28,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::{ops::ControlFlow, time::Instant};
 
-/// Side of the square of pixels whose mean stands for one (pixels).
-const MEAN: usize = 5;
+/// Side of the square of pixels whose mean stands for one (pixels). With 5 in place of 7, 48 renders of the demo at 32x32 for
+/// an error of .08 state .062 and have .076, by glints that few samples hit; with 7 they have .071, for a third more samples.
+const MEAN: usize = 7;
 
 /// Side of the square of such means of which the largest counts (pixels).
 const LARGEST: usize = 3;

@@ -71,7 +71,7 @@ fn states_its_error(scene: &Scene) {
         seeds.map(image).collect()
     };
     let adaptive = images(0..SEEDS, &goal(GOAL));
-    let uniform = images(100..100 + SEEDS, &Goal { samples: 32, error: None, deadline: None });
+    let uniform = images(100..100 + 4 * SEEDS, &Goal { samples: 32, error: None, deadline: None });
     assert!(adaptive.iter().all(|(_, outcome)| outcome.stop == Stop::Error));
     let n = f64::from(SEEDS);
     let stated = (adaptive.iter().map(|(_, o)| o.error.expect("an estimate").powi(2)).sum::<f64>() / n).sqrt();
@@ -85,11 +85,13 @@ fn states_its_error(scene: &Scene) {
     };
     let error = ((0..count).map(spread).sum::<f64>() / count as f64).sqrt();
     println!("stated {stated:.4}, is {error:.4}");
-    // What the estimate promises; it is .94 to 1.03 of the truth here, and .88 to 1.13 without tiles over 12 seeds.
+    // What the estimate promises; over 48 seeds the truth is 1.04 of it on Spot, and 1.14 on the demo, whose lamp makes
+    // glints that few samples hit.
     assert!((stated / error).max(error / stated) < 1.2, "stated {stated}, is {error}");
     let light = |images: &[(Vec<f64>, Outcome)]| -> Vec<f64> { images.iter().map(|(x, _)| x.iter().sum()).collect() };
     let ((a, a_error), (b, b_error)) = (mean_and_error(&light(&adaptive)), mean_and_error(&light(&uniform)));
-    assert!((a - b).abs() < 4.0 * a_error.hypot(b_error), "{a} +- {a_error} and {b} +- {b_error}");
+    // One run in a thousand has 5.41 with the seven degrees of freedom of eight seeds (Student's t); fixed ones have less.
+    assert!((a - b).abs() < 5.41 * a_error.hypot(b_error), "{a} +- {a_error} and {b} +- {b_error}");
 }
 
 #[test]
