@@ -11,7 +11,7 @@ vec2 table_bend = vec2(0.0);
 float table_scale = 0.0;
 
 uint table_base(Material m, uint node) {
-    return m.table + node * (TABLE_HEADER + 2u * m.table_cells + 1u);
+    return m.table + node * (TABLE_HEADER + (CELL_VECTORS + 1u) * (m.table_cells + 1u));
 }
 
 // Chooses the curvatures at the surface that is seen.
@@ -49,9 +49,10 @@ float table_bent(float r2, float bend, out float area) {
     return q <= 1.0 ? r2 * over * over : 0.0;
 }
 
-// Values between the two nodes of a cell, t from the first to the second.
-vec3 table_inside(vec3 cell, float t) {
-    uvec3 bits = floatBitsToUint(cell);
+// The channels' values between the two nodes of the cell that begins at `cell`, t from the first to the second.
+vec3 table_inside(uint cell, float t) {
+    if (CELL_VECTORS == 2u) return mix(profiles[cell], profiles[cell + 1u], t);
+    uvec3 bits = floatBitsToUint(profiles[cell]);
     uint most = (1u << TABLE_BITS) - 1u;
     vec3 low = vec3(bits >> (TABLE_BITS - 1u) & (most - 1u) | bits >> 31), high = vec3(bits & most);
     return uintBitsToFloat(bits & 0x7f800000u) * mix(low, high, t);
@@ -65,7 +66,7 @@ vec3 table_value(Material m, uint base, float r2) {
     // The value below the first node stands before the first cell.
     bool before = cell < m.table_first;
     uint i = before ? 0u : cell + 1u - m.table_first;
-    return table_inside(profiles[base + TABLE_HEADER - 1u + i], before ? 0.0 : (r2 - low) / (high - low));
+    return table_inside(base + TABLE_HEADER + CELL_VECTORS * i, before ? 0.0 : (r2 - low) / (high - low));
 }
 
 // Values between the two curvatures. Those of a density are divided by their masses.
@@ -149,8 +150,8 @@ float table_radius(Material m, float u_component, float u) {
     float share = (u_component - start) / (m.component_cdf[3u * c] - start);
     bool second = CURVATURE != 0 && table_weight < 1.0 && share >= table_weight;
     uint base = table_base(m, table_node + (second ? 1u : 0u));
-    uint cells = base + TABLE_HEADER;
-    uint within = cells + m.table_cells;
+    uint cells = base + TABLE_HEADER + CELL_VECTORS;
+    uint within = cells + CELL_VECTORS * m.table_cells;
     uint low = 0u, high = uint(profiles[base].y);
     float target = u * profiles[within + high][c];
     float bend = second ? table_bend.y : table_bend.x;
@@ -165,7 +166,7 @@ float table_radius(Material m, float u_component, float u) {
     }
     float s0 = uintBitsToFloat((m.table_first + low) << TABLE_SHIFT);
     float width = uintBitsToFloat((m.table_first + low + 1u) << TABLE_SHIFT) - s0;
-    vec3 cell = profiles[cells + low];
+    uint cell = cells + CELL_VECTORS * low;
     float a = table_inside(cell, 0.0)[c], b = table_inside(cell, 1.0)[c];
     float q = (target - profiles[within + low][c]) / (PI * width);
     float root = a + sqrt(max(a * a + 2.0 * (b - a) * q, 0.0));

@@ -92,8 +92,8 @@ const uint MODEL_LAMBERT = 5u;
 // Bits of an f32 below those that number a cell of a tabulated profile.
 const uint TABLE_SHIFT = 21u;
 // Vectors before a table's cells at each curvature.
-const uint TABLE_HEADER = 4u;
-// Bits of each of the two values of a table's cell.
+const uint TABLE_HEADER = 3u;
+// Bits of each of the two values of a table's packed cell.
 const uint TABLE_BITS = 12u;
 // Most halvings in the search of a distribution function, for at most 500 cells.
 const uint TABLE_HALVINGS = 9u;
@@ -305,6 +305,8 @@ layout(constant_id = 13) const uint REUSE = 0;
 layout(constant_id = 14) const uint REPROJECT = 0;
 // One of IRRADIANCE_*.
 layout(constant_id = 15) const uint IRRADIANCE = 0;
+// Vectors of a cell of tabulated profiles: 1 where both of its values are packed into one f32, 2 where each has its own.
+layout(constant_id = 16) const uint CELL_VECTORS = 0;
 
 // What is constant over a render: camera, pixels, environment, counts.
 struct View {

@@ -166,8 +166,10 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         let problem = format!("{x0},{y0},{x1},{y1} is not a part of {width}x{height} pixels");
         return Err(Error::setting("crop", problem));
     }
-    if ![1, 2, 4, 8].contains(&settings.reuse) {
-        return Err(Error::setting("reuse", format!("{} is not 1, 2, 4 or 8", settings.reuse)));
+    if let Some(width) = settings.reuse
+        && ![1, 2, 4, 8].contains(&width)
+    {
+        return Err(Error::setting("reuse", format!("{width} is not 1, 2, 4 or 8")));
     }
     let looks_up = settings.reproject == Reproject::Screen;
     if looks_up && settings.integrator != Integrator::Sample {
@@ -259,12 +261,13 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
         textures: kinds,
         rough: rough_rows,
         curvature: u32::from(!balances.is_empty()),
+        cell_vectors: if profiles.is_empty() { 0 } else { settings.precision.cell_vectors() },
         recorded: u32::from(settings.recording),
         mixtures: u32::from(!mixtures.is_empty()),
         integrator: settings.integrator as u32,
         reproject: if has_probes { settings.reproject as u32 } else { shared::REPROJECT_TRACE },
         irradiance: if has_probes { settings.irradiance as u32 } else { shared::IRRADIANCE_DIRECT },
-        reuse: if has_probes && shares_hits(settings, models, kinds, &mixtures) { settings.reuse } else { 0 },
+        reuse: if has_probes && shares_hits(settings, models, kinds, &mixtures) { settings.tile_width() } else { 0 },
         ..Features::default()
     };
     // Whole tiles, so that the pixels shown do not depend on the crop; a recording's buffers hold these alone.
@@ -307,7 +310,7 @@ pub(crate) fn prepare_again(scene: &Scene, settings: &Settings, before: Option<B
 /// Whether pixels of a tile may share their hits: all have the same value of a hit, but for its distance.
 fn shares_hits(settings: &Settings, models: u32, textures: u32, mixtures: &[shared::Mixture]) -> bool {
     let of_medium = 1 << shared::TEXTURE_SCATTER_COLOR | 1 << shared::TEXTURE_SCATTER_STRENGTH;
-    settings.reuse > 1
+    settings.tile_width() > 1
         && settings.projection == Projection::Mis
         && models & (1 << shared::MODEL_DIRECTIONAL) == 0
         && textures & of_medium == 0

@@ -179,6 +179,37 @@ impl Default for Cloud {
     }
 }
 
+/// How tabulated profiles are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// Two neighbouring values in one f32: an integer of 12 bits each, and the exponent that they share, so that one load
+    /// serves for three. Each is off by at most 1/4095 of the larger, and images by less than 1e-4.
+    #[default]
+    Packed,
+    /// Each value in an f32.
+    Full,
+}
+
+impl Precision {
+    /// Every choice, with its name on the command line.
+    pub const NAMES: [(Precision, &str); 2] = [(Precision::Packed, "packed"), (Precision::Full, "full")];
+
+    /// [`Features::cell_vectors`](shared::Features::cell_vectors).
+    pub fn cell_vectors(self) -> u32 {
+        match self {
+            Precision::Packed => 1,
+            Precision::Full => 2,
+        }
+    }
+}
+
+impl fmt::Display for Precision {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        let (_, name) = Precision::NAMES.iter().find(|(it, _)| it == self).expect("every choice has a name");
+        out.pad(name)
+    }
+}
+
 /// Which constant stands before the product of Fresnel factors and profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Normalisation {
@@ -332,6 +363,8 @@ pub struct Settings {
     pub irradiance: Irradiance,
     /// Of [`Irradiance::Cached`] alone.
     pub cache: Cache,
+    /// Of tabulated profiles.
+    pub precision: Precision,
     pub normalisation: Normalisation,
     /// Profile of every translucent material; `Auto` leaves it to each.
     pub model: Model,
@@ -342,11 +375,12 @@ pub struct Settings {
     /// Single scattering of every translucent material; `Auto` leaves it to each.
     pub single_scattering: SingleScattering,
     /// Width of the tiles of pixels that share the hits they light, 1 (none), 2, 4 or 8; see
-    /// [`reuse`](mod@crate::reference::reuse). Noise falls and goes together in neighbouring pixels, so the mean of many
+    /// [`reuse`](mod@crate::reference::reuse). Without it 8, and 4 with [`Reproject::Screen`], where noise falls as much as
+    /// frames take longer. Noise falls and goes together in neighbouring pixels, so the mean of many
     /// pixels is no better than it was; no expectation changes. Left out where it does not hold: with the
     /// [cloud](Integrator::Cloud), other projections than `Mis`, the directional dipole, sets of several materials and
     /// media that a texture changes.
-    pub reuse: u32,
+    pub reuse: Option<u32>,
     /// Key of all random numbers.
     pub seed: u32,
     /// Adds the environment where a camera ray hits nothing.
@@ -391,12 +425,13 @@ impl Default for Settings {
             reproject: Reproject::Trace,
             irradiance: Irradiance::Direct,
             cache: Cache::default(),
+            precision: Precision::Packed,
             normalisation: Normalisation::Energy,
             model: Model::Auto,
             directional: None,
             curvature: true,
             single_scattering: SingleScattering::Auto,
-            reuse: 8,
+            reuse: None,
             seed: 0,
             show_environment: false,
             variance: true,
@@ -407,5 +442,15 @@ impl Default for Settings {
             workgroup: shared::WORKGROUP,
             timeline: None,
         }
+    }
+}
+
+impl Settings {
+    /// Width of the tiles that share hits, where they do.
+    pub(crate) fn tile_width(&self) -> u32 {
+        self.reuse.unwrap_or(match self.reproject {
+            Reproject::Trace => 8,
+            Reproject::Screen => 4,
+        })
     }
 }

@@ -72,7 +72,7 @@ fn image(setup: &Setup, matter: &Matter, width: f64) -> Result<Image> {
     setup.render(
         matter,
         &scene,
-        Settings { resolution: Some(SIZE), reuse: 1, ..Settings::default() },
+        Settings { resolution: Some(SIZE), reuse: Some(1), ..Settings::default() },
         setup.samples(2048),
     )
 }

@@ -53,7 +53,7 @@ fn image(setup: &Setup, matter: &Matter) -> Result<Image> {
     setup.render(
         matter,
         &scene,
-        Settings { resolution: Some(SIZE), reuse: 1, ..Settings::default() },
+        Settings { resolution: Some(SIZE), reuse: Some(1), ..Settings::default() },
         setup.samples(8192),
     )
 }

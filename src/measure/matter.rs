@@ -49,7 +49,7 @@ impl Matter {
         if medium.sigma_s_prime.min_element() <= 0.0 {
             return Err(Error::setting("matter", "must scatter in every channel to be measured"));
         }
-        let settings = Settings { model, reuse: 1, ..Settings::default() };
+        let settings = Settings { model, reuse: Some(1), ..Settings::default() };
         let model = model::advise(&settings, &read, Detail::ALL, None).expect("it has a medium").choice.model;
         if model == Model::Lambert {
             return Err(Error::setting("model", "the opaque limit has no profile that could be measured"));

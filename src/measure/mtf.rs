@@ -76,7 +76,7 @@ fn image(setup: &Setup, matter: &Matter, period: f64) -> Result<Image> {
     setup.render(
         matter,
         &scene,
-        Settings { resolution: Some(SIZE), reuse: 1, ..Settings::default() },
+        Settings { resolution: Some(SIZE), reuse: Some(1), ..Settings::default() },
         setup.samples(1024),
     )
 }

@@ -94,7 +94,7 @@ fn radii(setup: &Setup, matter: &Matter) -> Result<Vec<f64>> {
         variance: false,
         seed: setup.seed,
         model: matter.model,
-        reuse: 1,
+        reuse: Some(1),
         ..Settings::default()
     };
     let prepared = prepare(&scene, &settings)?;

@@ -143,7 +143,7 @@ fn lit_ring(setup: &Setup, matter: &Matter, inner: f64, outer: f64) -> Result<(f
     let eye = Eye { eye: DVec3::Z * height / 2.0, at: DVec3::ZERO, lens: 2e-3 };
     let materials = [matter.material.clone(), json!({"name": "plate"})];
     let file = gltf(&[(body, 0), (plate, 1)], &materials, &[light], &eye);
-    let settings = Settings { resolution: Some((SIZE, SIZE)), reuse: 1, ..Settings::default() };
+    let settings = Settings { resolution: Some((SIZE, SIZE)), reuse: Some(1), ..Settings::default() };
     let image = setup.render(matter, &scene(&file)?, settings, setup.samples(512))?;
     let light = channel(&image, &format!("subsurface.{}", CHANNELS[CHANNEL]));
     let (mean, error) = mean_and_error(&light);

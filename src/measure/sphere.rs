@@ -42,7 +42,7 @@ pub fn sphere(setup: &Setup) -> Result<Figure> {
             let eye = Eye { eye: DVec3::new(0.0, 0.0, 10.0 * radius), at: DVec3::ZERO, lens: -VIEW * radius };
             let materials = std::slice::from_ref(&matter.material);
             let scene = scene_in_uniform_light(&gltf(&[(mesh, 0)], materials, &[], &eye))?;
-            let settings = Settings { resolution: Some((SIZE, SIZE)), reuse: 1, ..Settings::default() };
+            let settings = Settings { resolution: Some((SIZE, SIZE)), reuse: Some(1), ..Settings::default() };
             let image = setup.render(matter, &scene, settings, setup.samples(64))?;
             for ((c, _), points) in channels.iter().zip(&mut points) {
                 let disk = disk(matter, &image, *c);

@@ -98,8 +98,12 @@ impl Table {
 
     fn new(matter: &Coefficients, curvatures: Vec<f64>) -> Table {
         let mut numbers = Vec::new();
-        let options =
-            Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
+        let options = Options {
+            normalisation: Normalisation::Energy,
+            radius_tail: 0.0,
+            directional: Default::default(),
+            precision: Default::default(),
+        };
         let spheres: &[i32] = if curvatures.is_empty() { &[] } else { &SPHERES };
         let material = profile::tabulated(&[*matter; 3], options, spheres, &mut numbers);
         let strength = Profile::new(MODEL_TABLE, matter).strength();

@@ -227,6 +227,7 @@ fn material(
                 normalisation: settings.normalisation,
                 radius_tail: settings.radius_tail,
                 directional: settings.directional.or(medium.directional).unwrap_or_default(),
+                precision: settings.precision,
             };
             let mut out = match choice.model {
                 Model::Table => {

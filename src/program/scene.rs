@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use translucent::{
     CameraChoice, LoadOptions, Model, Normalisation, Projection, Scene, Settings, SingleScattering,
     scene::{AlbedoMapping, Environment, EnvironmentMap},
-    settings::{Cache, Cloud, Directional, Integrator, Irradiance, Reproject},
+    settings::{Cache, Cloud, Directional, Integrator, Irradiance, Precision, Reproject},
     timeline::Timeline,
 };
 
@@ -42,9 +42,13 @@ pub struct Method {
     /// (cached).
     #[arg(long, default_value = "direct", value_parser = irradiances())]
     irradiance: Irradiance,
-    /// Width in pixels of the tiles that share the hits they light, which divides noise among them; 1 shares none.
-    #[arg(long, value_name = "1|2|4|8", default_value = "8", value_parser = reuses())]
-    reuse: u32,
+    /// Width in pixels of the tiles that share the hits they light, which divides noise among them; 1 shares none. Auto
+    /// is 8, with --reproject screen 4.
+    #[arg(long, value_name = "auto|1|2|4|8", default_value = "auto", value_parser = reuses())]
+    reuse: Reuse,
+    /// Tabulated profiles as they are stored: two values in one f32 (packed), or each in its own (full).
+    #[arg(long, default_value = "packed", value_parser = precisions())]
+    precision: Precision,
     /// How light spreads in every translucent material; auto is what the material says, else what `inspect`
     /// recommends; lambert is the opaque limit, where light leaves where it entered.
     #[arg(long, default_value = "auto", value_parser = models())]
@@ -164,8 +168,19 @@ fn irradiances() -> impl TypedValueParser<Value = Irradiance> {
     })
 }
 
-fn reuses() -> impl TypedValueParser<Value = u32> {
-    PossibleValuesParser::new(["1", "2", "4", "8"]).map(|width| width.parse().expect("the parser passes numbers alone"))
+fn precisions() -> impl TypedValueParser<Value = Precision> {
+    PossibleValuesParser::new(Precision::NAMES.map(|(_, name)| name)).map(|text| {
+        let found = Precision::NAMES.into_iter().find(|(_, name)| *name == text);
+        found.expect("the parser passes names alone").0
+    })
+}
+
+/// None for auto.
+#[derive(Clone, Copy, Debug)]
+struct Reuse(Option<u32>);
+
+fn reuses() -> impl TypedValueParser<Value = Reuse> {
+    PossibleValuesParser::new(["auto", "1", "2", "4", "8"]).map(|width| Reuse(width.parse().ok()))
 }
 
 fn normalisations() -> impl TypedValueParser<Value = Normalisation> {
@@ -216,8 +231,9 @@ impl SceneOptions {
 impl Method {
     /// `settings` with these options.
     pub fn settings(&self, settings: Settings) -> Settings {
-        let Method { directions, integrator, projection, reproject, irradiance, reuse, model } = *self;
-        Settings { directions, integrator, projection, reproject, irradiance, reuse, model, ..settings }
+        let Method { directions, integrator, projection, reproject, irradiance, reuse, precision, model } = *self;
+        let Reuse(reuse) = reuse;
+        Settings { directions, integrator, projection, reproject, irradiance, reuse, precision, model, ..settings }
     }
 }
 

@@ -242,7 +242,8 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
             let Cloud { points, opening, samples } = settings.cloud;
             serde_json::json!([points, opening, samples])
         }),
-        "reuse": settings.reuse,
+        "reuse": settings.tile_width(),
+        "precision": settings.precision.to_string(),
         "reproject": settings.reproject.to_string(),
         "irradiance": settings.irradiance.to_string(),
         // Points, samples, spacing and tolerance.

@@ -223,7 +223,7 @@ fn room(prepared: &Prepared, slot: Slot) -> u64 {
         Slot::Profiles => {
             let tables = choices().filter(|choice| choice.model == Model::Table).count();
             let nodes = if prepared.features.curvature == 0 { 1 } else { TABLE_NODES };
-            tables * Block::size(nodes, MOST_CELLS)
+            tables * Block::size(nodes, MOST_CELLS, prepared.features.cell_vectors)
         }
         Slot::Boundaries => choices().count() * (prepared.features.rough * BOUNDARY_ROW) as usize,
         _ => 0,

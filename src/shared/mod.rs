@@ -108,8 +108,8 @@ constants! {
     /// Bits of an f32 below those that number a cell of a tabulated profile.
     TABLE_SHIFT: u32 = 21;
     /// Vectors before a table's cells at each curvature.
-    TABLE_HEADER: u32 = 4;
-    /// Bits of each of the two values of a table's cell.
+    TABLE_HEADER: u32 = 3;
+    /// Bits of each of the two values of a table's packed cell.
     TABLE_BITS: u32 = 12;
     /// Most halvings in the search of a distribution function, for at most 500 cells.
     TABLE_HALVINGS: u32 = 9;
@@ -806,6 +806,8 @@ features! {
     reproject = 14: REPROJECT,
     /// One of IRRADIANCE_*.
     irradiance = 15: IRRADIANCE,
+    /// Vectors of a cell of tabulated profiles: 1 where both of its values are packed into one f32, 2 where each has its own.
+    cell_vectors = 16: CELL_VECTORS,
 }
 
 impl Features {

@@ -8,19 +8,20 @@
 //!
 //! # Layout
 //! All are vectors, mostly of the three channels: a device without a gather instruction takes as long for one as for a number.
-//! Node by node of the curvature: (1/a, the number of cells that the sphere reaches, 0), 1 / mass, slope of the total in
-//! 1 - mu', the value below the first node, as a cell; then the cells of the grid, and the light within its nodes.
+//! Node by node of the curvature: (1/a, the number of cells that the sphere reaches, vectors of a cell), 1 / mass, slope of the
+//! total in 1 - mu'; then the value below the first node, as a cell, the cells of the grid, and the light within its nodes.
 //! A profile is divided by the total of the half-space, which is in the material's strength. After the last curvature comes
 //! what tiles weigh hits by: for each cell the half-space's values at its two nodes, not divided, summed over channels.
 //!
 //! # Cells
-//! A cell holds a channel's values at both of its nodes in the bits of one f32 ([`pack`]): two numbers of [`TABLE_BITS`] bits
-//! and the exponent that they share, so that one load serves for what is between. Each is off by at most 1/4095 of the larger,
-//! 1.2e-4 rms or less, which the simulation's own .2 to .6 % covers. The light within is that of the rounded values, and the
-//! strength of the material that for which the half-space still has its total.
+//! A cell holds a channel's values at both of its nodes: [`Precision::Full`] in two vectors, [`Precision::Packed`] in the bits of
+//! one f32 ([`pack`]), two numbers of [`TABLE_BITS`] bits and the exponent that they share, so that one load serves for what is
+//! between. Each is off by at most 1/4095 of the larger, 1.2e-4 rms or less, which the simulation's own .2 to .6 % covers. The
+//! light within is that of the stored values, and the strength of the material that for which the half-space still has its total.
 
 use super::grid;
 use super::white::{Profile, White};
+use crate::settings::Precision;
 use crate::shared::TABLE_BITS;
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
@@ -56,6 +57,7 @@ pub struct Block {
     /// First cell of the squared distance.
     pub first: u32,
     pub cells: u32,
+    pub precision: Precision,
     /// Totals of the half-space over the integrals of its profiles as they are stored.
     pub totals: DVec3,
     pub nodes: u32,
@@ -74,16 +76,15 @@ struct Column {
 /// A column as it is stored, over the half-space's total.
 struct Stored {
     slope: f64,
-    /// The value below the first node, and those of the cells, as [`pack`] has them.
-    below: f32,
-    cells: Vec<f32>,
+    /// What is below the first node, and the cells.
+    cells: Vec<Cell>,
     within: Vec<f64>,
     mass: f64,
 }
 
 impl Block {
     /// The tables of three channels on spheres of the radii 2^(i/2 - 1) (length), i ascending, and on the half-space.
-    pub fn new(channels: &[Option<Channel>; 3], spheres: &[i32]) -> Block {
+    pub fn new(channels: &[Option<Channel>; 3], spheres: &[i32], precision: Precision) -> Block {
         let present = || channels.iter().flatten();
         let finest = present().map(|c| 1.0 / (c.scattering / c.albedo)).fold(f64::INFINITY, f64::min);
         let farthest = present().map(|c| c.table.tail(c.albedo, BEYOND) / c.scattering).fold(0.0, f64::max);
@@ -92,7 +93,8 @@ impl Block {
         let first = grid::cell((low * low) as f32);
         let end = grid::cell((farthest * farthest) as f32) + 1;
         let cells = end.saturating_sub(first).clamp(1, MOST_CELLS);
-        let mut block = Block { first, cells, totals: DVec3::ZERO, nodes: spheres.len() as u32 + 1, data: vec![] };
+        let nodes = spheres.len() as u32 + 1;
+        let mut block = Block { first, cells, precision, totals: DVec3::ZERO, nodes, data: vec![] };
         let plane = channels.each_ref().map(|c| c.as_ref().map(|c| block.column(c, f64::INFINITY, cells)));
         let totals = plane.each_ref().map(|column| column.as_ref().map_or(0.0, |column| column.total));
         for &exponent in spheres {
@@ -107,14 +109,14 @@ impl Block {
         block
     }
 
-    /// Vectors of one curvature.
-    pub fn stride(cells: u32) -> usize {
-        HEADER + 2 * cells as usize + 1
+    /// Vectors of one curvature, with so many in a cell.
+    pub fn stride(cells: u32, cell_vectors: u32) -> usize {
+        HEADER + (cell_vectors as usize + 1) * (cells as usize + 1)
     }
 
     /// Vectors of a block.
-    pub fn size(nodes: u32, cells: u32) -> usize {
-        nodes as usize * Block::stride(cells) + cells as usize
+    pub fn size(nodes: u32, cells: u32, cell_vectors: u32) -> usize {
+        nodes as usize * Block::stride(cells, cell_vectors) + cells as usize
     }
 
     /// Adds a curvature; gives the integrals of the profiles that were stored, 1 for none.
@@ -124,26 +126,30 @@ impl Block {
         let stored = [0, 1, 2].map(|c| {
             let column = columns[c].as_ref()?;
             let value = |i: usize| column.values[i] / totals[c];
-            let below = pack(DVec2::splat(column.within[0] / totals[c] / inner));
-            let cells: Vec<f32> = (0..self.cells as usize)
-                .map(|i| if i < reached as usize { pack(DVec2::new(value(i), value(i + 1))) } else { NOTHING })
-                .collect();
-            let mut within = vec![inner * unpack(below).x];
-            for (i, cell) in cells.iter().enumerate() {
-                within.push(within[i] + area(i) * unpack(*cell).element_sum() / 2.0);
+            let below = DVec2::splat(column.within[0] / totals[c] / inner);
+            let ends = (0..self.cells as usize).map(|i| match i < reached as usize {
+                true => DVec2::new(value(i), value(i + 1)),
+                false => DVec2::ZERO,
+            });
+            let cells: Vec<Cell> =
+                std::iter::once(below).chain(ends).map(|ends| Cell::of(ends, self.precision)).collect();
+            let mut within = vec![inner * cells[0].ends().x];
+            for (i, cell) in cells[1..].iter().enumerate() {
+                within.push(within[i] + area(i) * cell.ends().element_sum() / 2.0);
             }
-            Some(Stored { slope: column.slope, below, cells, mass: within[within.len() - 1], within })
+            Some(Stored { slope: column.slope, cells, mass: within[within.len() - 1], within })
         });
         let vector = |none: f32, of: &dyn Fn(&Stored) -> f32| {
             Vec3::from(stored.each_ref().map(|stored| stored.as_ref().map_or(none, of)))
         };
+        let (dark, vectors) = (Cell::of(DVec2::ZERO, self.precision), self.precision.cell_vectors());
         self.data.extend([
-            Vec3::new(curvature as f32, reached as f32, 0.0),
+            Vec3::new(curvature as f32, reached as f32, vectors as f32),
             vector(0.0, &|stored| (1.0 / stored.mass) as f32),
             vector(0.0, &|stored| stored.slope as f32),
-            vector(NOTHING, &|stored| stored.below),
         ]);
-        self.data.extend((0..self.cells as usize).map(|i| vector(NOTHING, &|stored| stored.cells[i])));
+        let numbers = (0..=self.cells as usize).flat_map(|i| (0..vectors as usize).map(move |k| (i, k)));
+        self.data.extend(numbers.map(|(i, k)| vector(dark.numbers()[k], &|stored| stored.cells[i].numbers()[k])));
         self.data.extend((0..=self.cells as usize).map(|i| vector(0.0, &|stored| stored.within[i] as f32)));
         DVec3::from(stored.map(|stored| stored.map_or(1.0, |stored| stored.mass)))
     }
@@ -191,11 +197,50 @@ impl Block {
     }
 }
 
-/// Largest of the two numbers of a cell.
-const MOST: u32 = (1 << TABLE_BITS) - 1;
-/// The cell of two zeros.
-const NOTHING: f32 = f32::MIN_POSITIVE;
+/// A channel's values at the nodes of a cell, as they are stored.
+#[derive(Clone, Copy)]
+pub enum Cell {
+    Packed(f32),
+    Full([f32; 2]),
+}
 
+impl Cell {
+    /// Of the values at the two nodes.
+    fn of(ends: DVec2, precision: Precision) -> Cell {
+        match precision {
+            Precision::Packed => Cell::Packed(pack(ends)),
+            Precision::Full => Cell::Full(ends.as_vec2().to_array()),
+        }
+    }
+
+    /// The cell of channel c whose vectors these are.
+    pub fn read(vectors: &[Vec3], c: usize) -> Cell {
+        match *vectors {
+            [packed] => Cell::Packed(packed[c]),
+            [low, high, ..] => Cell::Full([low[c], high[c]]),
+            [] => unreachable!("a cell has vectors"),
+        }
+    }
+
+    /// The channel's numbers in the cell's vectors.
+    fn numbers(&self) -> &[f32] {
+        match self {
+            Cell::Packed(number) => std::slice::from_ref(number),
+            Cell::Full(numbers) => numbers,
+        }
+    }
+
+    /// The values at the two nodes.
+    pub fn ends(self) -> DVec2 {
+        match self {
+            Cell::Packed(number) => unpack(number),
+            Cell::Full([low, high]) => DVec2::new(low.into(), high.into()),
+        }
+    }
+}
+
+/// Largest of the two integers of a packed cell.
+const MOST: u32 = (1 << TABLE_BITS) - 1;
 /// Two values at least 0 in the bits of one f32 that is neither denormal, infinite nor NaN: 2^(e - 127) times two integers of
 /// [`TABLE_BITS`] bits, e in the place of the exponent, the second integer in the low bits, the first above it, but for its
 /// lowest bit, which is the sign.

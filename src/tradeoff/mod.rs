@@ -7,7 +7,7 @@
 //! squared error ([`Image::relative_mse`]) and as FLIP ([`Image::flip`]).
 //!
 //! A converged image is the mean of two with random numbers of their own, by the integrator `sample` with all
-//! projections combined; its own error is half of what lies between the two.
+//! projections combined and profiles stored in full; its own error is half of what lies between the two.
 //!
 //! What is rendered is kept in a folder, so that a run that was stopped, or is asked for more, renders only what is
 //! missing.
@@ -21,7 +21,7 @@ mod variant;
 pub use converged::Converged;
 pub use front::front;
 pub use run::{Progress, run};
-pub use variant::{Choice, Grid, IRRADIANCE, REPROJECT, Variant};
+pub use variant::{AXES, AXIS_COUNT, Axis, Choice, Grid, Variant};
 
 use crate::{Image, Model, Result};
 use serde_json::{Value, json};

@@ -1,15 +1,16 @@
 //! Renders what is missing, and measures it.
 
 use super::{
-    Converged, Errors, Grid, IRRADIANCE, Measured, Outcome, REPROJECT, Row, Times, Variant,
+    Converged, Errors, Grid, Measured, Outcome, Row, Times, Variant,
     store::{Kept, Store},
+    variant::DEFAULTS,
 };
 use crate::{
     Error, Image, Model, Result,
     gpu::Device,
     render::{Renderer, spirv_hash},
     scene::{self, Scene},
-    settings::{Integrator, Projection, Settings},
+    settings::{Integrator, Precision, Projection, Settings},
     timeline::Timeline,
 };
 use std::{
@@ -186,8 +187,7 @@ impl Run<'_> {
             model,
             integrator: Integrator::Sample,
             projection: Projection::Mis,
-            reproject: REPROJECT[0],
-            irradiance: IRRADIANCE[0],
+            choices: DEFAULTS,
             directions: self.grid.most_directions(),
             samples: half,
         };
@@ -195,7 +195,7 @@ impl Run<'_> {
         let mut session = None;
         for number in 1..=2 {
             let seed = self.settings.seed.wrapping_add(number);
-            let settings = Settings { seed, ..variant.settings(&self.settings) };
+            let settings = Settings { seed, precision: Precision::Full, ..variant.settings(&self.settings) };
             let name = format!("converged/{model}-{number}");
             let key = self.store.key(&settings, half);
             let image = match self.store.find(&name, &key) {

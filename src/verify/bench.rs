@@ -25,6 +25,7 @@ const EVERYTHING: Features = Features {
     textures: 1 << TEXTURE_BASE_COLOR,
     models: (1 << (MODEL_LAMBERT + 1)) - 1,
     curvature: 1,
+    cell_vectors: 1,
     recorded: 0,
     listed: 0,
     mixtures: 0,

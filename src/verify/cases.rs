@@ -7,7 +7,9 @@ use crate::{
     prepare::{Prepared, prepare},
     reference::Inputs,
     scene::{Environment, EnvironmentMap, LoadOptions, Scene},
-    settings::{Cloud, Directional, Integrator, Irradiance, Model, Projection, Reproject, Settings, SingleScattering},
+    settings::{
+        Cloud, Directional, Integrator, Irradiance, Model, Precision, Projection, Reproject, Settings, SingleScattering,
+    },
 };
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -99,7 +101,7 @@ fn settings(seed: u32) -> Settings {
         directions: 2,
         seed,
         show_environment: true,
-        reuse: 1,
+        reuse: Some(1),
         single_scattering: SingleScattering::Off,
         ..Settings::default()
     }
@@ -118,7 +120,7 @@ pub fn cases() -> Result<Vec<Case>> {
         ("burley, mis, emitters", Model::Burley, Mis, Light::Emitters),
         ("directional, mis, delta lights", Model::Directional, Mis, Light::Delta),
         ("directional, camera, image", Model::Directional, Camera, Light::Image),
-        ("table, mis, uniform light", Model::Table, Mis, Light::Constant),
+        ("table in full precision, mis, uniform light", Model::Table, Mis, Light::Constant),
         ("lambert, mis, emitters", Model::Lambert, Mis, Light::Emitters),
     ];
     let mut cases = vec![];
@@ -142,7 +144,8 @@ pub fn cases() -> Result<Vec<Case>> {
             _ => SingleScattering::Off,
         };
         let directional = Some(Directional { reciprocal: projection == Mis, ..Directional::default() });
-        let settings = Settings { model, projection, directional, single_scattering, ..settings(seed) };
+        let precision = Precision::Full;
+        let settings = Settings { model, projection, directional, single_scattering, precision, ..settings(seed) };
         cases.push(Case::new(name, scene, &settings)?);
     }
     cases.push(mixed()?);
@@ -203,7 +206,11 @@ fn tiled() -> Result<Vec<Case>> {
         materials[1] = matter([2.0, 3.0, 4.0], [0.3, 0.2, 0.1], 1.3);
         let scene = still_life(&materials, light)?;
         // Many hits are near where some of a tile's pixels no longer reach.
-        cases.push(Case::new(name, scene, &Settings { model, reuse, radius_tail: 0.09, ..settings(seed) })?);
+        cases.push(Case::new(
+            name,
+            scene,
+            &Settings { model, reuse: Some(reuse), radius_tail: 0.09, ..settings(seed) },
+        )?);
     }
     Ok(cases)
 }
@@ -223,7 +230,11 @@ fn looked_up() -> Result<Vec<Case>> {
         materials[1] = matter([2.0, 3.0, 4.0], [0.3, 0.2, 0.1], 1.3);
         let scene = still_life(&materials, light)?;
         let reproject = Reproject::Screen;
-        cases.push(Case::new(name, scene, &Settings { model, projection, reproject, reuse, ..settings(seed) })?);
+        cases.push(Case::new(
+            name,
+            scene,
+            &Settings { model, projection, reproject, reuse: Some(reuse), ..settings(seed) },
+        )?);
     }
     Ok(cases)
 }
@@ -243,7 +254,7 @@ pub(super) fn kept() -> Result<Vec<Case>> {
         materials[0]["extras"]["bssrdf"]["ior"] = json!(1.3);
         let scene = still_life(&materials, light)?;
         let irradiance = Irradiance::Cached;
-        let mut case = Case::new(name, scene, &Settings { model, irradiance, reuse, ..settings(seed) })?;
+        let mut case = Case::new(name, scene, &Settings { model, irradiance, reuse: Some(reuse), ..settings(seed) })?;
         let (cache, geometry) = (&mut case.prepared.cache, Geometry::of(&case.scene));
         // Some triangles are cut, as if they were larger.
         let spacing = |triangle: usize| {

@@ -41,7 +41,12 @@ fn seen_world(count: u32, perspective: bool) -> (World, Vec<Surface>) {
         rough: None,
         appearance: None,
     });
-    let options = Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
+    let options = Options {
+        normalisation: Normalisation::Energy,
+        radius_tail: 0.0,
+        directional: Default::default(),
+        precision: Default::default(),
+    };
     let mut world = World::new(profile::material(MODEL_STANDARD, &matter, options), PROJECTION_MIS, count);
     let eye = DVec3::new(1.0, 2.0, 4.0);
     match perspective {

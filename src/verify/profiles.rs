@@ -27,6 +27,7 @@ const OPTIONS: Options = Options {
     normalisation: Normalisation::Energy,
     radius_tail: 0.0,
     directional: crate::settings::Directional { renormalise: false, reciprocal: false, kappa: 1.0 },
+    precision: crate::settings::Precision::Packed,
 };
 
 /// Three channels of matter, with mean free paths from a hundredth to ten.
@@ -55,7 +56,8 @@ fn world(model: u32, count: u32) -> World {
     let materials = materials.collect();
     let shading = |i: u32| Shading { material: i % MEDIA, ..Shading::default() };
     let shadings: Vec<Shading> = (0..count).map(shading).collect();
-    let features = Features { models: 1 << model, curvature: u32::from(model == MODEL_TABLE), ..Features::default() };
+    let of_table = u32::from(model == MODEL_TABLE);
+    let features = Features { models: 1 << model, curvature: of_table, cell_vectors: of_table, ..Features::default() };
     let mut world = World { features, materials, shadings, profiles, ..World::default() };
     if model == MODEL_TABLE {
         // The curvature at each invocation: half-spaces, and spheres of many sizes.

@@ -28,7 +28,7 @@ pub fn standard(sigma_s: DVec3, sigma_a: DVec3, ior: f64, normalisation: Normali
         sigma_s,
         sigma_a,
         ior,
-        Options { normalisation, radius_tail, directional: Default::default() },
+        Options { normalisation, radius_tail, directional: Default::default(), precision: Default::default() },
     )
 }
 

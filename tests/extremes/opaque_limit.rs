@@ -26,7 +26,7 @@ fn ball(mean_free_path: f64, albedo: f64, model: Model) -> Vec<f64> {
         scene(&gltf(&[(Mesh::sphere(1.0, 40), 0)], &[matter([scattering; 3], [absorption; 3], IOR)], &[light], &eye));
     let resolution = Some((SIDE as u32, SIDE as u32));
     // Of half-spaces, whose limit it is.
-    let settings = Settings { resolution, seed: 4, model, curvature: false, reuse: 1, ..Settings::default() };
+    let settings = Settings { resolution, seed: 4, model, curvature: false, reuse: Some(1), ..Settings::default() };
     if model == Model::Auto {
         let advice = prepare(&scene, &settings).expect("valid").advice;
         let choice = &advice[0].as_ref().expect("translucent").choice;

@@ -19,7 +19,7 @@ const SIZE: u32 = 32;
 const GOAL: f64 = 0.08;
 
 fn settings() -> Settings {
-    Settings { resolution: Some((SIZE, SIZE)), estimate_error: true, reuse: 8, ..standard() }
+    Settings { resolution: Some((SIZE, SIZE)), estimate_error: true, reuse: Some(8), ..standard() }
 }
 
 fn goal(error: f64) -> Goal {
@@ -120,7 +120,7 @@ fn the_error_of_a_rough_ball_is_the_stated_one() {
 fn bands_and_interruptions_leave_it_right() {
     let (device, scene) = (device(), asset("demo.gltf"));
     // Tiles would end at the edges of bands.
-    let settings = Settings { reuse: 1, ..settings() };
+    let settings = Settings { reuse: Some(1), ..settings() };
     let render = |band_pixels| {
         let settings = Settings { band_pixels, ..settings.clone() };
         let mut renderer = Renderer::new(&device, &scene, &settings).expect("the renderer is made");

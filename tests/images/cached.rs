@@ -46,7 +46,7 @@ fn even_light_is_interpolated_exactly() {
     let scene = slab(&[], &[marble()], sun(), DVec3::Z * 100.0);
     for model in [Model::Standard, Model::Table] {
         for reuse in [1, 4] {
-            let of = |irradiance| light(&scene, &Settings { model, reuse, ..settings(irradiance) }, 4);
+            let of = |irradiance| light(&scene, &Settings { model, reuse: Some(reuse), ..settings(irradiance) }, 4);
             let (direct, cached) = (of(Irradiance::Direct), of(Irradiance::Cached));
             assert!(direct.iter().filter(|light| **light > 0.0).count() > 900, "{model}: the plane is lit");
             for (direct, cached) in direct.iter().zip(&cached) {
@@ -140,7 +140,7 @@ fn the_points_noise_falls_with_their_samples() {
     let scene = slab(&[(lamp, 1)], &[marble(), bright], json!({"type": "point", "intensity": 0.0}), DVec3::Z * 9.0);
     let apart = |samples| {
         let cache = Cache { samples, tolerance: 10.0, ..Cache::default() };
-        let of = |seed| light(&scene, &Settings { seed, cache, reuse: 8, ..settings(Irradiance::Cached) }, 64);
+        let of = |seed| light(&scene, &Settings { seed, cache, reuse: Some(8), ..settings(Irradiance::Cached) }, 64);
         let (a, b) = (of(1), of(2));
         let squares = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         (squares / a.iter().map(|a| a * a).sum::<f64>()).sqrt()

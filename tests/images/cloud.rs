@@ -20,7 +20,7 @@ fn settings(points: u32, opening: f64) -> Settings {
         seed: 2,
         integrator: Integrator::Cloud,
         cloud,
-        reuse: 1,
+        reuse: Some(1),
         ..Settings::default()
     }
 }

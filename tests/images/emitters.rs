@@ -61,7 +61,7 @@ fn mean(file: &Value, settings: &Settings, samples: u32, name: &str) -> (f64, f6
 }
 
 fn settings() -> Settings {
-    Settings { resolution: Some((16, 16)), seed: 3, model: Model::Standard, reuse: 1, ..Settings::default() }
+    Settings { resolution: Some((16, 16)), seed: 3, model: Model::Standard, reuse: Some(1), ..Settings::default() }
 }
 
 /// A block below z = 0.

@@ -93,7 +93,7 @@ impl Experiment {
                 projection,
                 model: self.model,
                 single_scattering: SingleScattering::Off,
-                reuse: 1,
+                reuse: Some(1),
                 ..Settings::default()
             };
             let image = render(&scene, &settings, 256);

@@ -36,7 +36,7 @@ fn dense() -> Value {
 }
 
 fn settings(side: u32) -> Settings {
-    Settings { resolution: Some((side, side)), seed: 8, reuse: 1, ..Settings::default() }
+    Settings { resolution: Some((side, side)), seed: 8, reuse: Some(1), ..Settings::default() }
 }
 
 #[test]

@@ -62,7 +62,7 @@ fn settings(size: u32) -> Settings {
         resolution: Some((size, size)),
         seed: 9,
         single_scattering: SingleScattering::Off,
-        reuse: 1,
+        reuse: Some(1),
         ..Settings::default()
     }
 }

@@ -26,7 +26,7 @@ use translucent::{
 
 fn settings(integrator: Integrator) -> Settings {
     // Noise of one pixel alone: errors are those of independent pixels.
-    Settings { resolution: Some((20, 20)), seed: 3, integrator, reuse: 1, ..standard() }
+    Settings { resolution: Some((20, 20)), seed: 3, integrator, reuse: Some(1), ..standard() }
 }
 
 fn lit(mut scene: Scene, radiance: f64) -> Scene {

@@ -47,7 +47,7 @@ fn two_runs_bands_portions_and_workgroups_give_the_same_bits() {
         assert_same(&whole, &image(&settings, &[3..27]), &format!("workgroups of {workgroup}"));
     }
     // Tiles do not end at the edge of a band.
-    let tiles = Settings { reuse: 8, ..settings() };
+    let tiles = Settings { reuse: Some(8), ..settings() };
     let whole = image(&tiles, &[3..27]);
     assert_same(&whole, &image(&tiles, &[3..4, 4..20, 20..27]), "tiles in portions");
     assert_same(&whole, &image(&Settings { workgroup: 32, ..tiles.clone() }, &[3..27]), "tiles by other workgroups");
@@ -88,7 +88,7 @@ fn image_in_the_middle_changes_nothing() {
 #[test]
 fn crop_is_a_part_of_the_whole() {
     for reuse in [1, 4, 8] {
-        crop_is_a_part(&Settings { reuse, ..settings() });
+        crop_is_a_part(&Settings { reuse: Some(reuse), ..settings() });
     }
 }
 

@@ -34,7 +34,7 @@ fn lamp() -> Value {
 }
 
 fn settings(reuse: u32, seed: u32) -> Settings {
-    Settings { resolution: Some((SIDE, SIDE)), reuse, seed, ..standard() }
+    Settings { resolution: Some((SIDE, SIDE)), reuse: Some(reuse), seed, ..standard() }
 }
 
 /// Six rays a sample, so light comes in two portions.

@@ -13,5 +13,5 @@ pub fn scene(file: &Value) -> Scene {
 
 /// The default settings with the standard dipole, whose closed forms are known.
 pub fn standard() -> Settings {
-    Settings { model: Model::Standard, reuse: 1, ..Settings::default() }
+    Settings { model: Model::Standard, reuse: Some(1), ..Settings::default() }
 }

@@ -120,7 +120,8 @@ fn a_ball_lacks_the_light_of_the_side_that_is_not_seen() {
 fn image_is_the_twins() {
     let mut all = vec![];
     for (projection, reuse) in [(Projection::Mis, 1), (Projection::Camera, 1), (Projection::Mis, 4)] {
-        let settings = Settings { resolution: Some((24, 24)), reuse, ..settings(projection, Reproject::Screen) };
+        let settings =
+            Settings { resolution: Some((24, 24)), reuse: Some(reuse), ..settings(projection, Reproject::Screen) };
         let (image, twins) = both(&ball(3.0, 0.3), &settings, 8);
         let found = differences(&image, &twins);
         assert!(found.len() > 300, "{projection:?}: {} lit values", found.len());

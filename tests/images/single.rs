@@ -32,7 +32,7 @@ fn a_plane_follows_lommel_and_seeliger() {
                 seed: 3,
                 model,
                 single_scattering,
-                reuse: 1,
+                reuse: Some(1),
                 ..Settings::default()
             };
             render(&scene, &settings, 128)

@@ -6,10 +6,15 @@ use crate::{
     twins::{both, differences},
 };
 use glam::DVec3;
-use translucent::{Model, Projection, Scene, Settings, reference::boundary::transmittance, scene::Environment};
+use translucent::{
+    Image, Model, Projection, Scene, Settings,
+    reference::boundary::transmittance,
+    scene::Environment,
+    settings::{Integrator, Precision},
+};
 
 fn settings(size: u32) -> Settings {
-    Settings { resolution: Some((size, size)), seed: 5, model: Model::Table, reuse: 1, ..Settings::default() }
+    Settings { resolution: Some((size, size)), seed: 5, model: Model::Table, reuse: Some(1), ..Settings::default() }
 }
 
 fn uniform(mut scene: Scene) -> Scene {
@@ -28,9 +33,13 @@ fn ball(sigma_s: [f64; 3], sigma_a: [f64; 3], ior: f64, lit: bool) -> Scene {
 #[test]
 fn image_is_the_twins() {
     let mut all = vec![];
-    for projection in [Projection::Mis, Projection::Camera] {
+    for (projection, precision) in [
+        (Projection::Mis, Precision::Packed),
+        (Projection::Mis, Precision::Full),
+        (Projection::Camera, Precision::Packed),
+    ] {
         let scene = uniform(ball([8.0, 4.0, 2.0], [0.3, 0.2, 0.1], 1.4, true));
-        let (image, twins) = both(&scene, &Settings { projection, directions: 2, ..settings(16) }, 4);
+        let (image, twins) = both(&scene, &Settings { projection, precision, directions: 2, ..settings(16) }, 4);
         all.extend(differences(&image, &twins));
     }
     all.sort_by(f64::total_cmp);
@@ -38,6 +47,26 @@ fn image_is_the_twins() {
     assert!(all.len() > 200, "{} lit values", all.len());
     // A radius is drawn from a distribution function in f32, whose cells hold down to 1e-4 of the light.
     assert!(outside * 100 <= all.len(), "{outside} of {}: {:?}", all.len(), &all[all.len() - outside..]);
+}
+
+#[test]
+fn packed_cells_change_images_within_their_rounding() {
+    let scene = uniform(ball([8.0, 4.0, 2.0], [0.3, 0.2, 0.1], 1.4, true));
+    for (integrator, reuse) in [(Integrator::Cloud, Some(1)), (Integrator::Sample, Some(1)), (Integrator::Sample, None)]
+    {
+        let image = |precision| render(&scene, &Settings { integrator, reuse, precision, ..settings(48) }, 32);
+        let [packed, full] = [Precision::Packed, Precision::Full].map(image);
+        let mean = |image: &Image| channel(image, "subsurface.G").iter().map(|x| f64::from(*x)).sum::<f64>();
+        let bias = mean(&packed) / mean(&full) - 1.0;
+        let between = packed.relative_mse(&full).expect("of one size").mean.sqrt();
+        println!("{integrator}, reuse {reuse:?}: mean {bias:+.1e}, root of relMSE {between:.1e}");
+        // The rms rounding of a value: of integers up to 4095 and half of that or more.
+        let rounding = (1.0 / 12f64).sqrt() / 2048.0;
+        assert!(bias.abs() < rounding, "{integrator}, reuse {reuse:?}: {bias}");
+        // Probes come out elsewhere by that much, some of them beyond the edge of a shadow.
+        assert!(between < rounding || integrator == Integrator::Sample, "{integrator}: {between}");
+        assert!(between > 0.0, "{integrator}: the precision changes nothing");
+    }
 }
 
 #[test]

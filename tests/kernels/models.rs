@@ -42,7 +42,12 @@ fn random_material(model: u32, i: u32) -> Material {
             appearance: None,
         }
     });
-    let options = Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
+    let options = Options {
+        normalisation: Normalisation::Energy,
+        radius_tail: 0.0,
+        directional: Default::default(),
+        precision: Default::default(),
+    };
     material(model, &matter, options)
 }
 
@@ -212,7 +217,12 @@ fn golden_values_on_the_device() {
         ((1.0, 0.01, 0.0, 1.3), dvec3(0.3, 0.0, -1.0), DVec3::Z, -DVec3::Z, 3.274425893e-2),
         ((0.70, 0.009, 0.0, 1.3), dvec3(0.3, 0.2, -0.1), dvec3(0.6, 0.0, 0.8), tilted, 3.155625660e-2),
     ];
-    let options = Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
+    let options = Options {
+        normalisation: Normalisation::Energy,
+        radius_tail: 0.0,
+        directional: Default::default(),
+        precision: Default::default(),
+    };
     let mut sweep = Sweep::of(vec![], vec![], vec![]);
     for (i, ((sigma_s, sigma_a, g, ior), x, wi, no, _)) in cases.into_iter().enumerate() {
         let matter =

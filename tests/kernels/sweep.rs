@@ -77,6 +77,7 @@ fn random_material(random: &mut Random, model: Model, projection: Projection) ->
         normalisation: Normalisation::Energy,
         radius_tail: random.pick(&[1e-6, 0.0]),
         directional: Default::default(),
+        precision: Default::default(),
     };
     let mut material = profile::material(profile::constant(model).expect("the model is built"), &channels, options);
     material.radius_max = material.radius_max.min(SET_DIAMETER);

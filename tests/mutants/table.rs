@@ -59,6 +59,7 @@ mutants! {
     "profile_table.glsl", "swapped", "profile.table": "mix(low, high, t)" => "mix(high, low, t)";
     "profile_table.glsl", "off by one", "profile.table": "before ? 0u : cell + 1u" => "before ? 0u : cell";
     "profile_table.glsl", "lost term", "profile.table": "(most - 1u) | bits >> 31" => "(most - 1u)";
+    "profile_table.glsl", "off by one", "kernel.sample": "profiles[cell + 1u], t)" => "profiles[cell], t)";
     "profile.glsl", "swapped branch", "profile.lambert":
         "table_obliqueness(m, m.slope, c, leaving)" => "table_obliqueness(m, m.slope, c, !leaving)";
     "mixture.glsl", "index", "profile.mixture": "x - float(k)" => "x - float(k + 1u)";

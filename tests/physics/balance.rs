@@ -26,8 +26,12 @@ impl Profiles {
             rough: None,
             appearance: None,
         });
-        let options =
-            Options { normalisation: Normalisation::Energy, radius_tail: 0.0, directional: Default::default() };
+        let options = Options {
+            normalisation: Normalisation::Energy,
+            radius_tail: 0.0,
+            directional: Default::default(),
+            precision: Default::default(),
+        };
         let mut tables = vec![];
         let spheres: Vec<i32> = (-2..12).collect();
         let material = tabulated(&matter, options, &spheres, &mut tables);

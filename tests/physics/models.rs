@@ -194,7 +194,12 @@ fn samplers_follow_the_profiles() {
     let bound = (2e6f64.ln() / (2.0 * f64::from(count))).sqrt();
     let (scattering, absorption) = (dvec3(2.0, 0.5, 1.0), dvec3(0.01, 0.5, 0.0));
     for model in [MODEL_STANDARD, MODEL_BETTER, MODEL_BURLEY, MODEL_DIRECTIONAL] {
-        let options = Options { normalisation: Energy, radius_tail: 0.0, directional: Default::default() };
+        let options = Options {
+            normalisation: Energy,
+            radius_tail: 0.0,
+            directional: Default::default(),
+            precision: Default::default(),
+        };
         let material = modelled(model, scattering, absorption, 1.4, options);
         let profiles = channels(scattering, absorption, 1.4).map(|channel| Profile::new(model, &channel));
         let number = |i: u32| unit(hash(i.wrapping_mul(0x9e37_79b9) ^ 0x51ed));
@@ -222,7 +227,12 @@ fn samplers_follow_the_profiles() {
 fn materials_return_their_total() {
     for model in RADIAL {
         for normalisation in [Energy, Jensen2001] {
-            let options = Options { normalisation, radius_tail: 1e-6, directional: Default::default() };
+            let options = Options {
+                normalisation,
+                radius_tail: 1e-6,
+                directional: Default::default(),
+                precision: Default::default(),
+            };
             let material = modelled(model, dvec3(2.0, 0.0, 1.0), dvec3(0.01, 0.5, 0.0), 1.4, options);
             assert_eq!((material.model, material.strength.y, material.density.y), (model, 0.0, 0.0));
             assert_eq!(material.component_cdf[8], 1.0);
@@ -289,7 +299,7 @@ fn directional_dipole_has_its_known_totals() {
 #[test]
 fn renormalised_it_gives_the_standard_total() {
     let directional = settings::Directional { renormalise: true, ..Default::default() };
-    let options = Options { normalisation: Energy, radius_tail: 1e-6, directional };
+    let options = Options { normalisation: Energy, radius_tail: 1e-6, directional, precision: Default::default() };
     let (scattering, absorption) = (dvec3(2.0, 0.0, 1.0), dvec3(0.01, 0.5, 0.0));
     let material = modelled(MODEL_DIRECTIONAL, scattering, absorption, 1.4, options);
     assert_eq!(material.beam.y, 0.0);
@@ -336,7 +346,7 @@ fn averaged_it_is_reciprocal() {
     }
     assert!(largest > 0.1, "as published it is not: {largest}");
     let directional = settings::Directional { reciprocal: true, ..Default::default() };
-    let options = Options { normalisation: Energy, radius_tail: 1e-6, directional };
+    let options = Options { normalisation: Energy, radius_tail: 1e-6, directional, precision: Default::default() };
     let flags = modelled(MODEL_DIRECTIONAL, DVec3::ONE, DVec3::ONE, 1.4, options).flags;
     assert_eq!(flags & RECIPROCAL, RECIPROCAL);
 }

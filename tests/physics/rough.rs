@@ -95,7 +95,12 @@ fn white(model: u32, roughness: f64, share: f64, ior: f64) -> (Material, Boundar
     let mut boundaries = Boundaries::new(share != 1.0, Energy);
     let (boundary, rough) = boundaries.add(alpha, ior);
     let matter = Coefficients { sigma_s_prime: 1e3, sigma_a: 0.0, g: 0.0, ior, rough: Some(rough), appearance: None };
-    let options = Options { normalisation: Energy, radius_tail: 1e-6, directional: Default::default() };
+    let options = Options {
+        normalisation: Energy,
+        radius_tail: 1e-6,
+        directional: Default::default(),
+        precision: Default::default(),
+    };
     let material = profile::material(model, &[matter; 3], options);
     (Material { alpha: alpha as f32, boundary, ..material }, boundaries)
 }

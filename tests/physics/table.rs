@@ -10,6 +10,7 @@ use translucent::reference::profile::{
 };
 use translucent::settings::Directional;
 use translucent::settings::Normalisation;
+use translucent::settings::Precision;
 use translucent::shared::MODEL_TABLE;
 use translucent::table::{
     block::{pack, unpack},
@@ -24,6 +25,7 @@ const OPTIONS: Options = Options {
     normalisation: Normalisation::Energy,
     radius_tail: 1e-4,
     directional: Directional { renormalise: false, reciprocal: false, kappa: 1.0 },
+    precision: Precision::Packed,
 };
 
 fn matter(sigma_s_prime: f64, sigma_a: f64, ior: f64) -> Coefficients {

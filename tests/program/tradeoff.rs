@@ -40,8 +40,8 @@ fn a_run_leaves_table_plots_and_page_and_is_gone_on_with() {
     let read = |name: &str| fs::read_to_string(out.join(name)).expect("written");
 
     let csv = read("tradeoff.csv");
-    let header = "model,integrator,projection,reproject,irradiance,directions,samples,seconds,prepare_seconds,\
-                  render_seconds,kernel_seconds,start_up_seconds,sampling_error,sampling_flip,model_error,model_flip,\
+    let header = "model,integrator,projection,reproject,irradiance,reuse,precision,directions,samples,seconds,\
+                  prepare_seconds,render_seconds,kernel_seconds,start_up_seconds,sampling_error,sampling_flip,model_error,model_flip,\
                   total_error,total_flip,reference_error,reference_flip,front_sampling_error,front_sampling_flip,\
                   front_total_error,front_total_flip,status";
     assert_eq!(csv.lines().next(), Some(header));
@@ -115,6 +115,32 @@ fn a_run_leaves_table_plots_and_page_and_is_gone_on_with() {
     let command = row["command"].as_str().and_then(|text| text.strip_prefix("translucent ")).expect("a command");
     folder.done(&format!("{command} -o again.exr --quiet"));
     let [again, was] =
-        [folder.image("again.exr"), folder.image("out/variants/standard-cloud-mis-trace-direct-1x2.exr")];
+        [folder.image("again.exr"), folder.image("out/variants/standard-cloud-mis-trace-direct-auto-packed-1x2.exr")];
     assert_eq!(again.channel("G").expect("contract"), was.channel("G").expect("contract"));
+}
+
+#[test]
+fn axes_that_change_nothing_are_left_at_their_defaults() {
+    let folder = Folder::new("tradeoff-axes");
+    folder.done(
+        "tradeoff SPOT --resolution 8x8 --models burley,table --integrators sample,cloud --projections mis --samples 1 \
+         --reference-samples 2 --against none --reuse 1,4 --precision packed,full --cloud-points 60 --quiet -o out",
+    );
+    let csv = fs::read_to_string(folder.join("out/tradeoff.csv")).expect("written");
+    let rows = rows(&csv);
+    let found: Vec<[&str; 4]> =
+        rows.iter().map(|row| ["model", "integrator", "reuse", "precision"].map(|name| row[name])).collect();
+    let expected = [
+        ["burley", "sample", "1", "packed"],
+        ["burley", "sample", "4", "packed"],
+        ["burley", "cloud", "auto", "packed"],
+        ["table", "sample", "1", "packed"],
+        ["table", "sample", "1", "full"],
+        ["table", "sample", "4", "packed"],
+        ["table", "sample", "4", "full"],
+        ["table", "cloud", "auto", "packed"],
+        ["table", "cloud", "auto", "full"],
+    ];
+    assert_eq!(found, expected, "{csv}");
+    assert!(rows.iter().all(|row| row["status"] == "rendered"), "{csv}");
 }

@@ -7,7 +7,7 @@ use translucent::tradeoff::{Against, Errors, Measure, Outcome};
 /// Every column: what was rendered; seconds, in all and by parts (`seconds` = prepare + render); errors as shares of 1,
 /// relative and FLIP: sampling, model, total, and the converged image's own; whether the variant is on the front (of
 /// its model by sampling error, of all by the total); and what came of it: rendered, kept, or why it was refused.
-pub const COLUMNS: &str = "model,integrator,projection,reproject,irradiance,directions,samples,\
+pub const COLUMNS: &str = "model,integrator,projection,reproject,irradiance,reuse,precision,directions,samples,\
 seconds,prepare_seconds,render_seconds,kernel_seconds,start_up_seconds,\
 sampling_error,sampling_flip,model_error,model_flip,total_error,total_flip,reference_error,reference_flip,\
 front_sampling_error,front_sampling_flip,front_total_error,front_total_flip,status";
@@ -23,15 +23,9 @@ pub fn text(outcome: &Outcome) -> String {
     let mut text = format!("{COLUMNS}\n");
     for (index, row) in outcome.rows.iter().enumerate() {
         let variant = &row.variant;
-        let mut cells = vec![
-            variant.model.to_string(),
-            variant.integrator.to_string(),
-            variant.projection(),
-            variant.reproject.0.into(),
-            variant.irradiance.0.into(),
-            variant.directions.to_string(),
-            variant.samples.to_string(),
-        ];
+        let mut cells = vec![variant.model.to_string(), variant.integrator.to_string(), variant.projection()];
+        cells.extend(variant.choices.map(|(name, _)| name.into()));
+        cells.extend([variant.directions, variant.samples].map(|number| number.to_string()));
         let converged = outcome.converged(variant.model);
         let model = converged.and_then(|converged| converged.error);
         let own = converged.map(|converged| converged.own);

@@ -27,7 +27,7 @@ use translucent::{
     image::write_whole,
     prepare,
     settings::Integrator,
-    tradeoff::{self, Against, Choice, Grid, IRRADIANCE, Measure, Outcome, Progress, REPROJECT},
+    tradeoff::{self, AXES, Against, Axis, Choice, Grid, Measure, Outcome, Progress},
 };
 
 /// Height of the image where none is asked for.
@@ -54,13 +54,21 @@ pub struct Tradeoff {
           default_value = "mis,camera,normal")]
     projections: Vec<Projection>,
     /// How surfaces are found, of the integrator sample.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(REPROJECT),
-          default_value = REPROJECT[0].0)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(&AXES[0]),
+          default_value = AXES[0].choices[0].0)]
     reproject: Vec<Choice>,
     /// How light at the sampled points is found, of the integrator sample.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(IRRADIANCE),
-          default_value = IRRADIANCE[0].0)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(&AXES[1]),
+          default_value = AXES[1].choices[0].0)]
     irradiance: Vec<Choice>,
+    /// Widths of the tiles that share hits, of the integrator sample.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(&AXES[2]),
+          default_value = AXES[2].choices[0].0)]
+    reuse: Vec<Choice>,
+    /// How tabulated profiles are stored. The converged images have them in full.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = choices(&AXES[3]),
+          default_value = AXES[3].choices[0].0)]
+    precision: Vec<Choice>,
     /// Numbers of samples of each pixel.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1,4,16,64",
           value_parser = clap::value_parser!(u32).range(1..=MOST))]
@@ -102,9 +110,9 @@ fn against() -> impl TypedValueParser<Value = Compared> {
         .map(|name| Compared(name.parse().ok()))
 }
 
-fn choices(all: &'static [Choice]) -> impl TypedValueParser<Value = Choice> {
-    PossibleValuesParser::new(all.iter().map(|(name, _)| *name))
-        .map(|name| *all.iter().find(|(known, _)| *known == name).expect("the parser passes names alone"))
+fn choices(axis: &'static Axis) -> impl TypedValueParser<Value = Choice> {
+    PossibleValuesParser::new(axis.choices.iter().map(|(name, _)| *name))
+        .map(|name| *axis.choices.iter().find(|(known, _)| *known == name).expect("the parser passes names alone"))
 }
 
 /// What the files say beside the numbers.
@@ -199,8 +207,8 @@ impl Tradeoff {
             models: distinct(&self.models, |a, b| a == b),
             integrators: distinct(&self.integrators, |a, b| a == b),
             projections: distinct(&self.projections, |a, b| a == b),
-            reproject: distinct(&self.reproject, |a, b| a.0 == b.0),
-            irradiance: distinct(&self.irradiance, |a, b| a.0 == b.0),
+            choices: [&self.reproject, &self.irradiance, &self.reuse, &self.precision]
+                .map(|list| distinct(list, |a, b| a.0 == b.0)),
             directions: distinct(&self.directions, |a, b| a == b),
             samples,
             converged_samples: self.reference_samples,

@@ -55,18 +55,12 @@ pub fn png(about: &About, measure: Measure) -> Result<Vec<u8>, Failed> {
 
 /// What a shape stands for: everything but model and samples.
 pub fn method(variant: &Variant) -> String {
-    let Variant { integrator, reproject, irradiance, directions, .. } = variant;
+    let Variant { integrator, directions, .. } = variant;
     let mut text = integrator.to_string();
     if variant.integrator == translucent::settings::Integrator::Sample {
         text += &format!(", {}", variant.projection());
     }
-    for (choice, all) in
-        [(reproject, translucent::tradeoff::REPROJECT), (irradiance, translucent::tradeoff::IRRADIANCE)]
-    {
-        if choice.0 != all[0].0 {
-            text += &format!(", {}", choice.0);
-        }
-    }
+    text.extend(variant.chosen().map(|(axis, name)| format!(", {axis} {name}")));
     if *directions != 1 { format!("{text}, {directions} directions") } else { text }
 }
 

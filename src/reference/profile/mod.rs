@@ -34,7 +34,7 @@ pub use table::Tabulated;
 use super::boundary::{Side, diffuse_reflectance};
 use super::rough::Rough;
 use crate::scene::{LengthKind, Medium};
-use crate::settings::{self, Model, Normalisation};
+use crate::settings::{self, Model, Normalisation, Precision};
 use crate::shared::{
     self, MODEL_BETTER, MODEL_BURLEY, MODEL_DIRECTIONAL, MODEL_LAMBERT, MODEL_STANDARD, MODEL_TABLE, Material,
     RECIPROCAL, TRANSLUCENT,
@@ -317,6 +317,7 @@ pub struct Options {
     /// Share of the energy beyond `radius_max`; 0 has no ball.
     pub radius_tail: f64,
     pub directional: settings::Directional,
+    pub precision: Precision,
 }
 
 impl Options {
@@ -396,7 +397,9 @@ pub fn tabulated(
     tables: &mut Vec<Vec3>,
 ) -> shared::Material {
     let mut out = material(MODEL_TABLE, matter, options);
-    let block = Block::new(&matter.each_ref().map(crate::table::channel), spheres);
+    let block = Block::new(&matter.each_ref().map(crate::table::channel), spheres, options.precision);
+    // Of the profiles as they are stored.
+    out.strength = (block.totals / options.leaving(matter[0].diffuse_reflectance(Side::Outside))).as_vec3();
     out.table = tables.len() as u32;
     (out.table_first, out.table_cells, out.table_nodes) = (block.first, block.cells, block.nodes);
     out.obliqueness = matter[0].mean_obliqueness() as f32;

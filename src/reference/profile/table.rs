@@ -16,10 +16,11 @@
 
 use super::{COMPONENTS, Coefficients, Matter, Options, Radial};
 use crate::reference::boundary::cos_refracted;
+use crate::settings::Precision;
 use crate::shared::Material;
 use crate::table::{
     self,
-    block::{Block, HEADER, unpack},
+    block::{Block, Cell, HEADER},
     grid,
 };
 use glam::{DVec2, DVec3, Vec3};
@@ -58,39 +59,48 @@ struct Node<'a> {
     /// 1 / mass, and k, of the channels.
     densities: DVec3,
     slope: DVec3,
-    /// Values below the first node, as a cell.
-    below: Vec3,
+    /// Vectors of a cell.
+    cell_vectors: usize,
+    /// Values below the first node as a cell, then the cells.
     cells: &'a [Vec3],
     within: &'a [Vec3],
 }
 
-/// The values of the channels at both nodes of a cell.
-fn ends(cell: Vec3) -> [DVec3; 2] {
-    let [x, y, z] = cell.to_array().map(unpack);
-    [DVec3::new(x.x, y.x, z.x), DVec3::new(x.y, y.y, z.y)]
+/// Where node k of a material's table begins, and its vectors.
+fn extent(matter: Matter, k: usize) -> (usize, usize) {
+    let Material { table, table_cells, .. } = *matter.material;
+    let cell_vectors = matter.tables[table as usize].z as u32;
+    let stride = Block::stride(table_cells, cell_vectors);
+    (table as usize + k * stride, stride)
 }
 
 impl<'a> Node<'a> {
     /// Node k of a material's table.
     fn of(matter: Matter<'a>, k: usize) -> Node<'a> {
-        let Material { table, table_first, table_cells, .. } = *matter.material;
-        let stride = Block::stride(table_cells);
-        Node::new(table_first, &matter.tables[table as usize + k * stride..][..stride])
+        let (start, stride) = extent(matter, k);
+        Node::new(matter.material.table_first, &matter.tables[start..][..stride])
     }
 
     fn new(first: u32, data: &'a [Vec3]) -> Node<'a> {
         let (header, nodes) = data.split_at(HEADER);
-        let (cells, within) = nodes.split_at(nodes.len() / 2);
+        let cell_vectors = header[0].z as usize;
+        let (cells, within) = nodes.split_at(nodes.len() / (cell_vectors + 1) * cell_vectors);
         Node {
             first,
             curvature: header[0].x.into(),
             reached: header[0].y as usize,
             densities: header[1].as_dvec3(),
             slope: header[2].as_dvec3(),
-            below: header[3],
+            cell_vectors,
             cells,
             within,
         }
+    }
+
+    /// A channel's values at both nodes of cell i, -1 below the first.
+    fn ends(&self, i: isize, c: usize) -> DVec2 {
+        let start = (i + 1) as usize * self.cell_vectors;
+        Cell::read(&self.cells[start..][..self.cell_vectors], c).ends()
     }
 
     /// Where the squared distance lies in the grid.
@@ -114,11 +124,11 @@ impl<'a> Node<'a> {
 
     fn values_in(&self, place: Place) -> DVec3 {
         match place {
-            Place::Before(_) => ends(self.below)[0],
-            Place::Cell { i, t, .. } => {
-                let [low, high] = ends(self.cells[i]);
-                low.lerp(high, t)
-            }
+            Place::Before(_) => DVec3::from([0, 1, 2].map(|c| self.ends(-1, c).x)),
+            Place::Cell { i, t, .. } => DVec3::from([0, 1, 2].map(|c| {
+                let ends = self.ends(i as isize, c);
+                ends.x * (1.0 - t) + ends.y * t
+            })),
             Place::Beyond => DVec3::ZERO,
         }
     }
@@ -132,7 +142,7 @@ impl<'a> Node<'a> {
         }
         let i = self.within[..self.reached].partition_point(|light| f64::from(light[c]) <= target) - 1;
         let [low, high] = [0, 1].map(|k| f64::from(grid::node(self.first + i as u32 + k)));
-        let [a, b] = unpack(self.cells[i][c]).to_array();
+        let [a, b] = self.ends(i as isize, c).to_array();
         // Light from the edge over the cell's area: a t + (b - a) t^2 / 2.
         let q = (target - within(i)) / (PI * (high - low));
         let root = a + (a * a + 2.0 * (b - a) * q).max(0.0).sqrt();
@@ -149,7 +159,8 @@ impl<'a> Node<'a> {
         match place {
             Place::Before(share) => self.within[0].as_dvec3() * share,
             Place::Cell { i, past, .. } => {
-                let mean = (ends(self.cells[i])[0] + self.values_in(place)) / 2.0;
+                let low = DVec3::from([0, 1, 2].map(|c| self.ends(i as isize, c).x));
+                let mean = (low + self.values_in(place)) / 2.0;
                 self.within[i].as_dvec3() + PI * past * mean
             }
             Place::Beyond => self.total(),
@@ -239,8 +250,8 @@ pub(in crate::reference) fn reach(matter: Matter) -> f64 {
 /// The half-space's value at the squared distance, all channels together, of matter that reflects all light: constant
 /// below the first node.
 pub(in crate::reference) fn weighed(matter: Matter, s: f64) -> f64 {
-    let Material { table, table_first, table_cells, table_nodes, .. } = *matter.material;
-    let values = &matter.tables[table as usize + table_nodes as usize * Block::stride(table_cells)..];
+    let Material { table_first, table_cells, table_nodes, .. } = *matter.material;
+    let values = &matter.tables[extent(matter, table_nodes as usize).0..];
     let i = grid::cell(s as f32).clamp(table_first, table_first + table_cells - 1) - table_first;
     let [low, high] = [i, i + 1].map(|i| f64::from(grid::node(table_first + i)));
     let t = ((s - low) / (high - low)).clamp(0.0, 1.0);
@@ -339,8 +350,8 @@ impl Tabulated {
     /// The channel on a half-space.
     pub(super) fn of(matter: &Coefficients) -> Tabulated {
         let channel = table::channel(matter);
-        let mut block = Block::new(&[channel.clone(), None, None], &[]);
-        block.data.truncate(Block::stride(block.cells));
+        let mut block = Block::new(&[channel.clone(), None, None], &[], Precision::Full);
+        block.data.truncate(Block::stride(block.cells, Precision::Full.cell_vectors()));
         Tabulated {
             channel: 0,
             strength: block.totals.x,
@@ -351,9 +362,9 @@ impl Tabulated {
     }
 
     pub(super) fn unpack(matter: Matter, channel: usize) -> Tabulated {
-        let Material { table, table_first, table_cells, table_nodes, sigma_tr, .. } = *matter.material;
-        let stride = Block::stride(table_cells);
-        let data = matter.tables[table as usize + (table_nodes as usize - 1) * stride..][..stride].to_vec();
+        let Material { table_first, table_nodes, sigma_tr, .. } = *matter.material;
+        let (start, stride) = extent(matter, table_nodes as usize - 1);
+        let data = matter.tables[start..][..stride].to_vec();
         Tabulated { channel, strength: 1.0, rate: f64::from(sigma_tr[channel]), first: table_first, data }
     }
 
