@@ -54,10 +54,11 @@ const uint TECHNIQUE_CAMERA = 3;
 vec4 technique_fractions(float cos_eye) {
     if (PROJECTION == PROJECTION_NORMAL) return vec4(1.0, 0.0, 0.0, 0.0);
     if (PROJECTION == PROJECTION_CAMERA || REPROJECT == REPROJECT_SCREEN) return vec4(0.0, 0.0, 0.0, 1.0);
-    float s = clamp(cos_eye / 0.3, 0.0, 1.0);
-    float camera = 0.4 * s * s * (3.0 - 2.0 * s);
+    float s = clamp(cos_eye / CAMERA_FADE, 0.0, 1.0);
+    float camera = CAMERA_FRACTION * s * s * (3.0 - 2.0 * s);
     float rest = 1.0 - camera;
-    return vec4(rest * (2.0 / 3.0), rest / 6.0, rest / 6.0, camera);
+    float tangents = TANGENT_FRACTION * rest;
+    return vec4(rest - tangents, 0.5 * tangents, 0.5 * tangents, camera);
 }
 
 // Where the camera ray through xo + delta crosses the tangent plane: dist_tan / dist, and 0 behind the eye.

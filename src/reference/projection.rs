@@ -28,7 +28,8 @@ use super::math::basis;
 use super::profile::{Matter, plane_density};
 use super::texture;
 use crate::shared::{
-    Features, MODEL_TABLE, Material, PROJECTION_CAMERA, PROJECTION_NORMAL, REPROJECT_SCREEN, Surface, Triangle,
+    CAMERA_FADE, CAMERA_FRACTION, Features, MODEL_TABLE, Material, PROJECTION_CAMERA, PROJECTION_NORMAL,
+    REPROJECT_SCREEN, Surface, TANGENT_FRACTION, Triangle,
 };
 use glam::DVec3;
 
@@ -37,9 +38,6 @@ pub const NORMAL: usize = 0;
 pub const TANGENT_U: usize = 1;
 pub const TANGENT_V: usize = 2;
 pub const CAMERA: usize = 3;
-
-/// Cosine of view below which the camera's fraction decreases.
-const FADE: f64 = 0.3;
 
 /// A surface as the camera sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,10 +144,11 @@ pub fn fractions(projection: u32, cos: f64) -> [f64; 4] {
         PROJECTION_CAMERA => [0.0, 0.0, 0.0, 1.0],
         PROJECTION_NORMAL => [1.0, 0.0, 0.0, 0.0],
         _ => {
-            let s = (cos / FADE).clamp(0.0, 1.0);
-            let camera = 0.4 * s * s * (3.0 - 2.0 * s);
+            let s = (cos / f64::from(CAMERA_FADE)).clamp(0.0, 1.0);
+            let camera = f64::from(CAMERA_FRACTION) * s * s * (3.0 - 2.0 * s);
             let rest = 1.0 - camera;
-            [rest * 2.0 / 3.0, rest / 6.0, rest / 6.0, camera]
+            let tangents = f64::from(TANGENT_FRACTION) * rest;
+            [rest - tangents, tangents / 2.0, tangents / 2.0, camera]
         }
     }
 }
