@@ -212,7 +212,7 @@ pub(super) fn sizes(scene: &Scene, prepared: &Prepared, pixels: u32) -> Vec<(Slo
 
 /// Bytes that a buffer may come to need: points that are added where light varies; and where a renderer records and
 /// matter changes ([`Renderer::update`]), tables of any matter, 488 kB for each material (18 kB where profiles do not depend
-/// on curvatures), and a rough boundary of each translucent material's own.
+/// on curvatures; half as much again in full precision), and a rough boundary of each translucent material's own.
 ///
 /// [`Renderer::update`]: super::Renderer::update
 fn room(prepared: &Prepared, slot: Slot) -> u64 {
