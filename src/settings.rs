@@ -158,11 +158,12 @@ impl fmt::Display for Integrator {
 /// How fine [`Integrator::Cloud`] is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cloud {
-    /// Most points, on all surfaces together, 1 to [`Cloud::POINTS_MAX`]. Fewer where half a mean free path between
-    /// them is reached.
+    /// Most points, on all surfaces together, 1 to [`Cloud::POINTS_MAX`]. Fewer where their spacing is reached.
     pub points: u32,
     /// A group of points counts as one if its radius is less than this share of its distance; 0 to 1. 0 counts each point.
     pub opening: f64,
+    /// Distance between points that is fine enough, in mean free paths; positive.
+    pub spacing: f64,
     /// Samples that light each point, of [`Settings::directions`] directions and points of emitters each; at least 1.
     /// Delta lights need none.
     pub samples: u32,
@@ -175,7 +176,7 @@ impl Cloud {
 
 impl Default for Cloud {
     fn default() -> Self {
-        Cloud { points: 1 << 15, opening: 0.7, samples: 32 }
+        Cloud { points: 1 << 15, opening: 0.7, spacing: 0.5, samples: 32 }
     }
 }
 

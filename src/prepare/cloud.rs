@@ -21,8 +21,6 @@ use std::{
     f64::consts::PI,
 };
 
-/// Distance between points, in mean free paths, that is fine enough.
-const SPACING: f64 = 0.5;
 /// Radius within which light is interpolated, in distances between points.
 const REACH: f64 = 2.5;
 /// Size over distance of triangles below which the profile at their middle stands for them.
@@ -41,12 +39,15 @@ pub(super) fn clusters(
     profiles: &[Vec3],
     thickness: &[Vec3],
 ) -> Result<Vec<Cluster>> {
-    let Cloud { points, opening, samples } = settings.cloud;
+    let Cloud { points, opening, spacing, samples } = settings.cloud;
     if !(1..=Cloud::POINTS_MAX).contains(&points) {
         return Err(Error::setting("cloud points", format!("{points} is not between 1 and {}", Cloud::POINTS_MAX)));
     }
     if !(0.0..=1.0).contains(&opening) {
         return Err(Error::setting("cloud opening", format!("{opening} is not in [0, 1]")));
+    }
+    if !(spacing > 0.0 && spacing.is_finite()) {
+        return Err(Error::setting("cloud spacing", format!("{spacing} is not a number above 0")));
     }
     if samples == 0 {
         return Err(Error::setting("cloud samples", "must be at least 1"));
@@ -82,7 +83,7 @@ pub(super) fn clusters(
         let extinction = (medium.sigma_s_prime + medium.sigma_a).max_element() / scene.frame.scale;
         sets.push((number as u32, area, 1.0 / extinction));
     }
-    let wanted = |area: f64, path: f64| (area / (SPACING * path).powi(2)).max(16.0);
+    let wanted = |area: f64, path: f64| (area / (spacing * path).powi(2)).max(16.0);
     let all: f64 = sets.iter().map(|(_, area, path)| wanted(*area, *path)).sum();
     let share = (f64::from(points) / all).min(1.0);
     let mut leaves = vec![];

@@ -74,6 +74,9 @@ pub struct Subject {
     /// Size over distance below which points of the cloud count together, 0 to 1; 0 counts each.
     #[arg(long, value_name = "X", default_value_t = Cloud::default().opening, value_parser = arguments::not_negative)]
     cloud_opening: f64,
+    /// Distance between points of the cloud that is fine enough, in mean free paths.
+    #[arg(long, value_name = "X", default_value_t = Cloud::default().spacing, value_parser = arguments::not_negative)]
+    cloud_spacing: f64,
     /// Samples that light each point of the cloud.
     #[arg(long, value_name = "M", default_value_t = Cloud::default().samples, value_parser = clap::value_parser!(u32).range(1..))]
     cloud_samples: u32,
@@ -284,7 +287,12 @@ impl Subject {
             resolution: self.resolution,
             camera: self.camera.clone().unwrap_or_default(),
             crop: self.crop,
-            cloud: Cloud { points: self.cloud_points, opening: self.cloud_opening, samples: self.cloud_samples },
+            cloud: Cloud {
+                points: self.cloud_points,
+                opening: self.cloud_opening,
+                spacing: self.cloud_spacing,
+                samples: self.cloud_samples,
+            },
             cache: Cache {
                 points: self.cache_points,
                 samples: self.cache_samples,

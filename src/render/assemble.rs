@@ -237,10 +237,10 @@ pub fn described(renderer: &Renderer) -> serde_json::Value {
         "camera": renderer.prepared.camera.name,
         "directions": settings.directions,
         "integrator": settings.integrator.to_string(),
-        // Points, opening and samples.
+        // Points, opening, spacing and samples.
         "cloud": (settings.integrator == Integrator::Cloud).then(|| {
-            let Cloud { points, opening, samples } = settings.cloud;
-            serde_json::json!([points, opening, samples])
+            let Cloud { points, opening, spacing, samples } = settings.cloud;
+            serde_json::json!([points, opening, spacing, samples])
         }),
         "reuse": settings.tile_width(),
         "precision": settings.precision.to_string(),

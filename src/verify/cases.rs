@@ -285,7 +285,7 @@ pub fn clouds() -> Result<Vec<Case>> {
     for (seed, (name, model, light, roughness)) in (17..).zip(list) {
         let mut scene = still_life(&materials(), light)?;
         scene.materials[0].roughness = roughness;
-        let cloud = Cloud { points: 1500, opening: 0.4, samples: 3 };
+        let cloud = Cloud { points: 1500, opening: 0.4, samples: 3, ..Cloud::default() };
         let settings = Settings { model, integrator: Integrator::Cloud, cloud, ..settings(seed) };
         cases.push(Case::new(name, scene, &settings)?);
     }

@@ -13,7 +13,7 @@ use translucent::{
 };
 
 fn settings(points: u32, opening: f64) -> Settings {
-    let cloud = Cloud { points, opening, samples: 32 };
+    let cloud = Cloud { points, opening, ..Cloud::default() };
     Settings {
         resolution: Some((20, 20)),
         model: Model::Standard,
@@ -73,10 +73,11 @@ fn the_error_falls_with_spacing_and_opening() {
         // Standard error of the mean over all pixels, which are independent.
         let pixels = truth.channel("A").expect("contract").len() as f64;
         let total = |values: &[f32]| values.iter().map(|x| f64::from(*x)).sum::<f64>() / pixels;
-        let errors: Vec<(f64, f64)> = [(500, 1.0), (4000, 0.5), (16000, 0.1)]
+        let errors: Vec<(f64, f64)> = [(500, 1.0, 0.5), (4000, 0.5, 0.5), (16000, 0.1, 0.5), (64000, 0.1, 0.25)]
             .into_iter()
-            .map(|(points, opening)| {
-                let image = render(&scene, &Settings { model, ..settings(points, opening) }, 48);
+            .map(|(points, opening, spacing)| {
+                let cloud = Cloud { points, opening, spacing, ..Cloud::default() };
+                let image = render(&scene, &Settings { model, cloud, ..settings(1, 0.0) }, 48);
                 let of = |name: &str| {
                     let (found, truth) = (channel(&image, name), channel(&truth, name));
                     let squares = found.iter().zip(truth).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
@@ -90,6 +91,7 @@ fn the_error_falls_with_spacing_and_opening() {
         let noise = total(channel(&truth, "variance.R")).sqrt() / total(channel(&truth, "subsurface.R"));
         assert!(errors[2].0 < 0.02 + 2.0 * noise && errors[2].1 < 0.01, "{model}: {errors:?}, noise {noise}");
         assert!(errors[2].0 < errors[0].0 && errors[2].1 < errors[0].1, "{model}: {errors:?}");
+        assert!(errors[3].0 < errors[0].0 && errors[3].1 < 0.005, "{model}: {errors:?}");
     }
 }
 
@@ -119,7 +121,11 @@ fn new_lights_light_the_cloud_anew() {
 fn what_cannot_be_gathered_is_refused_by_name() {
     let scene = pair();
     let device = device();
-    let cloud = |points, opening, samples| Settings { cloud: Cloud { points, opening, samples }, ..settings(9, 0.1) };
+    let cloud = |points, opening, samples| {
+        let cloud = Cloud { points, opening, samples, ..Cloud::default() };
+        Settings { cloud, ..settings(9, 0.1) }
+    };
+    let spaced = |spacing| Settings { cloud: Cloud { spacing, ..Cloud::default() }, ..settings(9, 0.1) };
     let refused = [
         (Settings { model: Model::Directional, ..settings(9, 0.1) }, "directional dipole"),
         (Settings { recording: true, ..settings(9, 0.1) }, "recordings"),
@@ -127,6 +133,8 @@ fn what_cannot_be_gathered_is_refused_by_name() {
         (cloud(9, 1.5, 1), "cloud opening"),
         (cloud(9, f64::NAN, 1), "cloud opening"),
         (cloud(9, 0.1, 0), "cloud samples"),
+        (spaced(0.0), "cloud spacing"),
+        (spaced(f64::NAN), "cloud spacing"),
     ];
     for (settings, word) in refused {
         let error = Renderer::new(&device, &scene, &settings).err().expect(word).to_string();
