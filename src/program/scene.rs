@@ -36,18 +36,18 @@ pub struct Method {
     projection: Projection,
     /// How surfaces are found: trace rays through the scene / look the point up in the G-buffer (screen: fast, sees only what
     /// the camera sees).
-    #[arg(long, default_value = "trace", value_parser = reprojects())]
+    #[arg(long, default_value = "trace", value_parser = named(&Reproject::NAMES))]
     reproject: Reproject,
     /// Light at the sampled point: traced for each sample, or looked up between points of the surface that are lit once
     /// (cached).
-    #[arg(long, default_value = "direct", value_parser = irradiances())]
+    #[arg(long, default_value = "direct", value_parser = named(&Irradiance::NAMES))]
     irradiance: Irradiance,
     /// Width in pixels of the tiles that share the hits they light, which divides noise among them; 1 shares none. Auto
     /// is 8, with --reproject screen 4.
     #[arg(long, value_name = "auto|1|2|4|8", default_value = "auto", value_parser = reuses())]
     reuse: Reuse,
     /// Tabulated profiles as they are stored: two values in one f32 (packed), or each in its own (full).
-    #[arg(long, default_value = "packed", value_parser = precisions())]
+    #[arg(long, default_value = "packed", value_parser = named(&Precision::NAMES))]
     precision: Precision,
     /// How light spreads in every translucent material; auto is what the material says, else what `inspect`
     /// recommends; lambert is the opaque limit, where light leaves where it entered.
@@ -142,11 +142,14 @@ pub struct Subject {
     crop: Option<[u32; 4]>,
 }
 
+/// One of the values by its name.
+fn named<T: Copy + Send + Sync + 'static>(all: &'static [(T, &'static str)]) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.iter().map(|(_, name)| *name))
+        .map(|text| all.iter().find(|(_, name)| *name == text).expect("the parser passes names alone").0)
+}
+
 pub fn integrators() -> impl TypedValueParser<Value = Integrator> {
-    PossibleValuesParser::new(Integrator::NAMES.map(|(_, name)| name)).map(|text| {
-        let found = Integrator::NAMES.into_iter().find(|(_, name)| *name == text);
-        found.expect("the parser passes names alone").0
-    })
+    named(&Integrator::NAMES)
 }
 
 pub fn projections() -> impl TypedValueParser<Value = Projection> {
@@ -154,27 +157,6 @@ pub fn projections() -> impl TypedValueParser<Value = Projection> {
         "camera" => Projection::Camera,
         "normal" => Projection::Normal,
         _ => Projection::Mis,
-    })
-}
-
-fn reprojects() -> impl TypedValueParser<Value = Reproject> {
-    PossibleValuesParser::new(Reproject::NAMES.map(|(_, name)| name)).map(|text| {
-        let found = Reproject::NAMES.into_iter().find(|(_, name)| *name == text);
-        found.expect("the parser passes names alone").0
-    })
-}
-
-fn irradiances() -> impl TypedValueParser<Value = Irradiance> {
-    PossibleValuesParser::new(Irradiance::NAMES.map(|(_, name)| name)).map(|text| {
-        let found = Irradiance::NAMES.into_iter().find(|(_, name)| *name == text);
-        found.expect("the parser passes names alone").0
-    })
-}
-
-fn precisions() -> impl TypedValueParser<Value = Precision> {
-    PossibleValuesParser::new(Precision::NAMES.map(|(_, name)| name)).map(|text| {
-        let found = Precision::NAMES.into_iter().find(|(_, name)| *name == text);
-        found.expect("the parser passes names alone").0
     })
 }
 

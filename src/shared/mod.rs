@@ -167,7 +167,7 @@ constants! {
     RAMP: u32 = 512;
     /// Share of camera rays among the probes of all techniques combined, where the camera looks onto the surface. This and
     /// the next by measured squared errors of six scenes (a slab, balls, Spot; 8 samples, tiles): .25 and .25 have 0 to 11 %
-    /// less, but on a flat place under the sun 40 % more; .15 and .25, .1 and .33 or .4 and .15 more on some and less on
+    /// less, but on a flat place under tiles 40 % more; .15 and .25, .1 and .33 or .4 and .15 more on some and less on
     /// others; .55 and .15 a quarter more.
     CAMERA_FRACTION: f32 = 0.4;
     /// Share of the two tangents among the rest.

@@ -33,16 +33,21 @@ fn an_evenly_lit_plane_has_the_golden_radiance() {
     let light = (sun(), DVec3::Z * 100.0, DVec3::ZERO);
     let eye = Eye { eye: DVec3::Z * 10.0, at: DVec3::ZERO, lens: 0.3 };
     let scene = scene(&gltf(&[(mesh, 0)], &[matter([0.95; 3], [0.05; 3], 1.3)], &[light], &eye));
-    let error = |points, opening| {
-        let image = render(&scene, &settings(points, opening), 8);
+    let spaced = |points, opening, spacing| {
+        let cloud = Cloud { points, opening, spacing, ..Cloud::default() };
+        let image = render(&scene, &Settings { cloud, ..settings(1, 0.0) }, 8);
         let squares = channel(&image, "subsurface.G").iter().map(|x| (f64::from(*x) / 0.418_550_831 - 1.0).powi(2));
         (squares.sum::<f64>() / 400.0).sqrt()
     };
+    let error = |points, opening| spaced(points, opening, 0.5);
     // As the settings state it: of single points less than 1 % at spacings from two mean free paths to half of one, and of
     // groups by the default opening less than 2 %.
     let errors = [error(2000, 0.0), error(8000, 0.0), error(32000, 0.0), error(32000, 0.7)];
     println!("rms errors: {errors:?}");
     assert!(errors[..3].iter().all(|error| *error < 0.01) && errors[3] < 0.02, "{errors:?}");
+    // No more points than the spacing asks for.
+    let coarse = spaced(32000, 0.0, 2.0);
+    assert!(coarse > errors[2], "{coarse}, not more than {}", errors[2]);
 }
 
 /// Two bodies that nearly touch, of different matter, one of them rough, under a lamp, the sun and a sky.
@@ -91,7 +96,9 @@ fn the_error_falls_with_spacing_and_opening() {
         let noise = total(channel(&truth, "variance.R")).sqrt() / total(channel(&truth, "subsurface.R"));
         assert!(errors[2].0 < 0.02 + 2.0 * noise && errors[2].1 < 0.01, "{model}: {errors:?}, noise {noise}");
         assert!(errors[2].0 < errors[0].0 && errors[2].1 < errors[0].1, "{model}: {errors:?}");
-        assert!(errors[3].0 < errors[0].0 && errors[3].1 < 0.005, "{model}: {errors:?}");
+        // As near as the sampled image tells.
+        let error = noise / pixels.sqrt();
+        assert!(errors[3].0 < errors[0].0 && errors[3].1 < 4.0 * error, "{model}: {errors:?} +- {error}");
     }
 }
 

@@ -97,10 +97,11 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// A channel's values at both nodes of cell i, -1 below the first.
-    fn ends(&self, i: isize, c: usize) -> DVec2 {
-        let start = (i + 1) as usize * self.cell_vectors;
-        Cell::read(&self.cells[start..][..self.cell_vectors], c).ends()
+    /// The channels' values at both nodes of a cell: 0 is below the first node, i + 1 cell i.
+    fn ends(&self, cell: usize) -> [DVec3; 2] {
+        let vectors = &self.cells[cell * self.cell_vectors..][..self.cell_vectors];
+        let [x, y, z] = [0, 1, 2].map(|c| Cell::read(vectors, c).ends());
+        [DVec3::new(x.x, y.x, z.x), DVec3::new(x.y, y.y, z.y)]
     }
 
     /// Where the squared distance lies in the grid.
@@ -124,11 +125,11 @@ impl<'a> Node<'a> {
 
     fn values_in(&self, place: Place) -> DVec3 {
         match place {
-            Place::Before(_) => DVec3::from([0, 1, 2].map(|c| self.ends(-1, c).x)),
-            Place::Cell { i, t, .. } => DVec3::from([0, 1, 2].map(|c| {
-                let ends = self.ends(i as isize, c);
-                ends.x * (1.0 - t) + ends.y * t
-            })),
+            Place::Before(_) => self.ends(0)[0],
+            Place::Cell { i, t, .. } => {
+                let [low, high] = self.ends(i + 1);
+                low.lerp(high, t)
+            }
             Place::Beyond => DVec3::ZERO,
         }
     }
@@ -142,7 +143,7 @@ impl<'a> Node<'a> {
         }
         let i = self.within[..self.reached].partition_point(|light| f64::from(light[c]) <= target) - 1;
         let [low, high] = [0, 1].map(|k| f64::from(grid::node(self.first + i as u32 + k)));
-        let [a, b] = self.ends(i as isize, c).to_array();
+        let [a, b] = self.ends(i + 1).map(|values| values[c]);
         // Light from the edge over the cell's area: a t + (b - a) t^2 / 2.
         let q = (target - within(i)) / (PI * (high - low));
         let root = a + (a * a + 2.0 * (b - a) * q).max(0.0).sqrt();
@@ -159,8 +160,7 @@ impl<'a> Node<'a> {
         match place {
             Place::Before(share) => self.within[0].as_dvec3() * share,
             Place::Cell { i, past, .. } => {
-                let low = DVec3::from([0, 1, 2].map(|c| self.ends(i as isize, c).x));
-                let mean = (low + self.values_in(place)) / 2.0;
+                let mean = (self.ends(i + 1)[0] + self.values_in(place)) / 2.0;
                 self.within[i].as_dvec3() + PI * past * mean
             }
             Place::Beyond => self.total(),
